@@ -1,0 +1,1 @@
+"""A robot that learns to reach and to walk."""

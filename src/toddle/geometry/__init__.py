@@ -1,0 +1,1 @@
+"""Pure mathematics: rotations, frames, splines, pinhole cameras."""

@@ -1,0 +1,1 @@
+"""All that touches the world: files, pictures, the terminal, simulators."""

@@ -1,0 +1,1 @@
+"""Physics: bodies in MuJoCo with servos, gravity and sensor noise."""

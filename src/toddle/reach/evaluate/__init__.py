@@ -1,0 +1,1 @@
+"""How well it reaches: test sets, errors, coverage."""

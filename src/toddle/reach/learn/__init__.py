@@ -1,0 +1,1 @@
+"""Learners: ``init / update / predict``, one sample at a time."""

@@ -1,0 +1,1 @@
+"""Solvers: from a learner to an answer for a target."""

@@ -1,0 +1,1 @@
+"""Bodies: rigid chains from URDF, MJCF and Denavit-Hartenberg tables, and the continuum arm."""
