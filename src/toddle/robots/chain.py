@@ -15,7 +15,9 @@ from jaxtyping import Array, Float
 
 from toddle.robots.body import Body
 
-_UNROLL = 16  # longer chains loop over their axes: a compiled line for each of 50 axes takes longer than it saves
+_UNROLL = (
+    16  # longer chains loop over their axes: a compiled line for each of 50 axes takes longer than it saves
+)
 
 
 class Chain(Body):
@@ -85,7 +87,12 @@ def z_motion(motion: Float[Array, ""], slides: Float[Array, ""]) -> Float[Array,
     turn, slide = motion * (1 - slides), motion * slides
     cos, sin = jnp.cos(turn), jnp.sin(turn)
     zero, one = jnp.zeros_like(cos), jnp.ones_like(cos)
-    rows = [[cos, -sin, zero, zero], [sin, cos, zero, zero], [zero, zero, one, slide], [zero, zero, zero, one]]
+    rows = [
+        [cos, -sin, zero, zero],
+        [sin, cos, zero, zero],
+        [zero, zero, one, slide],
+        [zero, zero, zero, one],
+    ]
     return jnp.array(rows)
 
 
