@@ -12,6 +12,7 @@ import sys
 from collections.abc import Sequence
 
 from toddle.failures import ToddleError, unknown_name
+from toddle.outside.compile_cache import use_compile_cache
 
 _LOOPS = """\
  the control loop                                  the learning loop
@@ -37,7 +38,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return the exit code: 0 done, 1 it failed or its verdict is no, 2 the call was wrong."""
     words = list(sys.argv[1:] if argv is None else argv)
     try:
-        return _dispatch(words)
+        exit_code = _dispatch(words)
+        sys.stdout.flush()
+        return exit_code
     except ToddleError as failure:
         return _tell(failure.line, failure.exit_code)
     except KeyboardInterrupt:
@@ -45,6 +48,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         _silence_stdout()
         return 1
+    except OSError as fault:
+        return _tell(f"{fault.filename or 'the system'}: {fault.strerror or fault}", 1)
     except Exception as fault:
         if os.environ.get("TODDLE_DEBUG"):
             raise
@@ -67,6 +72,7 @@ def _dispatch(words: list[str]) -> int:
         raise unknown_name("option", words[0], ["--help", "--version"])
     if words[0] not in COMMANDS:
         raise unknown_name("command", words[0], COMMANDS)
+    use_compile_cache()
     return importlib.import_module(f"toddle.cli.{words[0]}").main(words[1:])
 
 

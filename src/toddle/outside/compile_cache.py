@@ -1,0 +1,53 @@
+"""Compiled code is kept on disk, so that a second start does not compile again; called by the command line only."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+from collections.abc import MutableMapping
+from pathlib import Path
+
+
+def use_compile_cache(environment: MutableMapping[str, str] | None = None) -> Path | None:
+    """Tell JAX, before it is imported, where to keep what it compiles; what the user has set stays.
+
+    Args:
+        environment: where JAX looks for its settings; the process's own by default.
+
+    Returns:
+        The folder, or None where none can be written: then every start compiles again.
+    """
+    settings = os.environ if environment is None else environment
+    settings.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")
+    if "JAX_COMPILATION_CACHE_DIR" in settings:
+        return Path(settings["JAX_COMPILATION_CACHE_DIR"])
+    folder = cache_home(settings) / "jax" / _processor()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None
+    if not os.access(folder, os.W_OK | os.X_OK):
+        return None
+    settings["JAX_COMPILATION_CACHE_DIR"] = str(folder)
+    settings.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+    settings.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
+    return folder
+
+
+def cache_home(environment: MutableMapping[str, str]) -> Path:
+    """Where toddle keeps what it can make again: XDG_CACHE_HOME, or ~/.cache, and ``toddle`` in it."""
+    home = (
+        environment.get("XDG_CACHE_HOME") or Path(environment.get("HOME", os.path.expanduser("~"))) / ".cache"
+    )
+    return Path(home) / "toddle"
+
+
+def _processor() -> str:
+    """A name for this kind of processor: a home folder may be shared by machines that can't run each other's code."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(errors="replace").splitlines()
+    except OSError:
+        lines = [platform.processor()]
+    features = next((line for line in lines if line.lower().startswith(("flags", "features"))), lines[0])
+    return f"{platform.machine()}-{hashlib.sha256(features.encode()).hexdigest()[:12]}"
