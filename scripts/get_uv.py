@@ -1,7 +1,7 @@
-"""Get uv, without root and without touching anything outside one folder: ``python3 scripts/get_uv.py .tools``.
+"""Get uv, without root and without touching anything outside one folder: ``python3 get_uv.py .tools``.
 
-Leaves FOLDER/bin/uv. Runs on any Python from 3.6 on, with nothing but the standard library, and tries in turn what a
-bare machine may lack: a virtual environment with pip, pip alone, and PyPI's own index with the wheel's checksum.
+Leaves FOLDER/bin/uv. Runs on any Python from 3.8 on, with nothing but the standard library, and tries in turn
+what a bare machine may lack: a virtual environment with pip, pip alone, and PyPI's index with its checksums.
 """
 
 import hashlib
@@ -81,9 +81,9 @@ def fits(filename):
 
 def call(*command):
     """Run a command; its last line is the reason when it fails."""
-    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if done.returncode:
-        raise RuntimeError((done.stdout.strip().splitlines() or ["exit code {}".format(done.returncode)])[-1])
+        raise RuntimeError((done.stdout.strip().splitlines() or [f"exit code {done.returncode}"])[-1])
 
 
 def keep(uv, target):

@@ -35,7 +35,11 @@ _EXAMPLES = """\
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command and return the exit code: 0 done, 1 it failed or its verdict is no, 2 the call was wrong."""
+    """Run one command.
+
+    Returns:
+        The exit code: 0 done, 1 it failed or its verdict is no, 2 the call was wrong, 130 interrupted.
+    """
     words = list(sys.argv[1:] if argv is None else argv)
     try:
         exit_code = _dispatch(words)

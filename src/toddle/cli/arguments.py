@@ -1,8 +1,8 @@
 """A command's arguments, derived from its frozen dataclass; every mistake is one line that names the remedy.
 
 `parse` reads ``--learning-rate 0.1``, ``--learning-rate=0.1``, flags (``--json``, ``--no-json``), lists
-(``--joints a b c``) and positional words into the fields of the same names. A field's type says what it takes; the
-docstring's ``Attributes:`` say what it is for.
+(``--joints a b c``) and positional words into the fields of the same names. A field's type says what it
+takes; the docstring's ``Attributes:`` say what it is for.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ def parse(config: type[Config], argv: Sequence[str], *, prog: str) -> Config:
         prog: the command as the user calls it, for the help and the messages ("toddle reach").
 
     Raises:
-        BadInput: an option that is unknown, given twice, lacks a value or has a bad one; a word too many; a field
-            that must be given and was not.
+        BadInput: an option that is unknown, given twice, lacks a value or has a bad one; a word too many; a
+            field that must be given and was not.
         SystemExit: with code 0 after ``--help`` was printed.
     """
     options = options_of(config)
@@ -80,7 +80,7 @@ def _read(options: tuple[Option, ...], words: list[str], prog: str) -> dict[str,
 
 
 def _values(option: Option, words: list[str]) -> list[str]:
-    """Take the words that belong to an option off the front: up to the next option, or as many as it takes."""
+    """Take an option's words off the front: up to the next option, or as many as it takes."""
     values: list[str] = []
     while words and (option.most is None or len(values) < option.most) and not _OPTION.fullmatch(words[0]):
         values.append(words.pop(0))

@@ -1,4 +1,4 @@
-"""One option of a command: what a dataclass field may be on the command line, and how its words become a value."""
+"""One option of a command: what a dataclass field may be on the command line, how words become its value."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ NOT_FINITE = "not finite"
 class Option:
     """A field of a configuration, as it is given on the command line.
 
-    The field's type is one of str, int, float, bool, Path, a Literal or an Enum; a tuple of these, of fixed or any
-    length (``tuple[float, ...]``); or one of all that, or None.
+    The field's type is one of str, int, float, bool, Path, a Literal or an Enum; a tuple of these, of fixed
+    or any length (``tuple[float, ...]``); or one of all that, or None.
 
     Attributes:
         name: the field's name.

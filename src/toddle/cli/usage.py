@@ -1,4 +1,4 @@
-"""What ``toddle COMMAND --help`` prints: the usage, what the command does, and each option with its default."""
+"""What ``toddle COMMAND --help`` prints: the usage, what the command does, each option and its default."""
 
 from __future__ import annotations
 

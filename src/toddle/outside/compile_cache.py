@@ -1,4 +1,4 @@
-"""Compiled code is kept on disk, so that a second start does not compile again; called by the command line only."""
+"""Compiled code is kept on disk, so that a second start doesn't compile again; only the command line asks."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def cache_home(environment: MutableMapping[str, str]) -> Path:
 
 
 def _processor() -> str:
-    """A name for this kind of processor: a home folder may be shared by machines that can't run each other's code."""
+    """A name for this kind of processor: machines that can't run each other's code may share a home."""
     try:
         lines = Path("/proc/cpuinfo").read_text(errors="replace").splitlines()
     except OSError:
