@@ -51,8 +51,6 @@ class CallablePlant:
             BadInput: no joints, names that repeat, limits that are not finite or not in order, home outside
             them.
         """
-        if not callable(function):
-            raise BadInput(f"{function!r} cannot be called", where=name, remedy="give a function q -> x")
         self.name, self.joints = name, tuple(joints)
         if not self.joints or len(set(self.joints)) < len(self.joints):
             raise BadInput(
@@ -109,13 +107,15 @@ class CallablePlant:
         return ToddleError(f"call {self.moves} {what}", where=self.name, remedy=remedy)
 
     def _vector(self, argument: str, values: ArrayLike) -> Float[np.ndarray, " joints"]:
-        vector = np.array(values, dtype=float)
-        if vector.shape != (len(self.joints),) or not np.isfinite(vector).all():
+        remedy = f"give {len(self.joints)} finite numbers"
+        try:
+            vector = np.array(values, dtype=float)
+        except (TypeError, ValueError) as error:
             raise BadInput(
-                f"{argument} = {_short(vector)} cannot be used",
-                where=self.name,
-                remedy=f"give {len(self.joints)} finite numbers",
-            )
+                f"{argument} = {_short(values)} is no vector", where=self.name, remedy=remedy
+            ) from error
+        if vector.shape != (len(self.joints),) or not np.isfinite(vector).all():
+            raise BadInput(f"{argument} = {_short(vector)} cannot be used", where=self.name, remedy=remedy)
         return vector
 
 

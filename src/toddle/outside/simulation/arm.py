@@ -128,20 +128,21 @@ class PhysicsPlant:
         self.moves = int(state["moves"][0])
 
     def _start(self) -> None:
-        start = self._arm.gain @ self.home + self._arm.offset
-        self.data.qpos[:], self.data.ctrl[:] = start, start
+        home = self._command(self.home)
+        self.data.qpos[:], self.data.ctrl[:] = home, home
         mujoco.mj_step(self.model, self.data, nstep=_STEPS)
         self._settle()
         self.data.time = 0.0
 
     def _command(self, q: ArrayLike) -> Float[np.ndarray, " servos"]:
-        values = np.asarray(q, dtype=float)
+        remedy = f"give {len(self.joints)} finite numbers: {', '.join(self.joints)}"
+        try:
+            values = np.asarray(q, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise BadInput("joint values must be numbers", where=self.name, remedy=remedy) from error
         if values.shape != self.home.shape or not np.isfinite(values).all():
-            raise BadInput(
-                f"joint values {np.array2string(values, threshold=8)} cannot be moved to",
-                where=self.name,
-                remedy=f"give {len(self.joints)} finite numbers: {', '.join(self.joints)}",
-            )
+            shown = np.array2string(values, threshold=8)
+            raise BadInput(f"joint values {shown} cannot be moved to", where=self.name, remedy=remedy)
         return self._arm.gain @ np.clip(values, self.lower, self.upper) + self._arm.offset
 
     def _ramp(self, command: Float[np.ndarray, " servos"]) -> Float[np.ndarray, "commands servos"]:
