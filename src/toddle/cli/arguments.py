@@ -15,7 +15,7 @@ from typing import TypeVar
 
 from toddle.cli.options import Option, options_of, shown
 from toddle.cli.usage import usage
-from toddle.failures import BadInput, unknown_name
+from toddle.failures import BadInput
 
 Config = TypeVar("Config")
 
@@ -64,7 +64,7 @@ def _read(options: tuple[Option, ...], words: list[str], prog: str) -> dict[str,
             words.insert(0, word)
             value = option.convert(_values(option, words))
         elif name not in flags:
-            raise unknown_name("option", name, [*flags, "--help"], where=prog)
+            raise _unknown_option(name, [*flags, "--help"], prog)
         else:
             option, fixed = flags[name]
             if fixed is not None and equals:
@@ -85,6 +85,13 @@ def _values(option: Option, words: list[str]) -> list[str]:
     while words and (option.most is None or len(values) < option.most) and not _OPTION.fullmatch(words[0]):
         values.append(words.pop(0))
     return values
+
+
+def _unknown_option(name: str, known: Sequence[str], prog: str) -> BadInput:
+    bare = {flag.strip("-"): flag for flag in known}  # the dashes, which all have, would make all look alike
+    near = difflib.get_close_matches(name.strip("-").replace("_", "-"), bare, n=2, cutoff=0.6)
+    remedy = f"did you mean {' or '.join(bare[n] for n in near)}?" if near else f"known: {', '.join(known)}"
+    return BadInput(f"no option named {shown(name)}", where=prog, remedy=remedy)
 
 
 def _one_word_too_many(word: str, flags: dict[str, tuple[Option, bool | None]], prog: str) -> BadInput:

@@ -73,7 +73,9 @@ class Option:
 
     @property
     def example(self) -> str:
-        """How to give it."""
+        """How to give it; a flag that stands by default, how to take it away."""
+        if self.default is True:
+            return "--no-" + self.flag[2:]
         return self.words if self.positional else f"{self.flag} {self.words}".strip()
 
     def convert(self, words: list[str]) -> object:

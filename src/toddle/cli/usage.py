@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import textwrap
 from dataclasses import MISSING
+from enum import Enum
 
 from toddle.cli.options import Option
 
@@ -39,11 +40,13 @@ def _line(option: Option, width: int) -> str:
 
 
 def _note(default: object) -> str:
-    """The default as the help shows it; what is off, empty or must be given has none."""
+    """The default as the help shows it; a flag has none, nor what is empty."""
     if default is MISSING:
         return "(must be given)"
-    if default is None or default is False or default == ():
+    if default is None or isinstance(default, bool) or default == ():
         return ""
+    if isinstance(default, Enum):
+        return f"[{default.value}]"
     if isinstance(default, list | tuple):
         return f"[{' '.join(map(str, default))}]"
-    return "[on]" if default is True else f"[{default}]"
+    return f"[{default}]"
