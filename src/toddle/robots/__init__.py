@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from toddle.robots.catalogue import describe as describe
     from toddle.robots.catalogue import load as load
     from toddle.robots.catalogue import names as names
+    from toddle.robots.catalogue import record as record
     from toddle.robots.chain import Chain as Chain
 
 _HOMES = {
@@ -24,10 +25,11 @@ _HOMES = {
     "describe": "catalogue",
     "load": "catalogue",
     "names": "catalogue",
+    "record": "catalogue",
     "Chain": "chain",
 }
 
-__all__ = ["Body", "Chain", "Plant", "Robot", "describe", "load", "names"]
+__all__ = ["Body", "Chain", "Plant", "Robot", "describe", "load", "names", "record"]
 
 
 def __getattr__(name: str) -> object:

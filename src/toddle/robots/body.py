@@ -1,8 +1,8 @@
 """What a body is: something that answers "where is the tip when the joints stand like this?".
 
-Learners see pairs (q, x) and nothing else; they never look inside a body. A `Body` is a frozen JAX pytree, so it runs
-under ``jit``, ``vmap`` and ``scan``; what can't (a plant in physics, a real robot, any callable) answers the same
-question one call at a time (`Plant`).
+Learners see pairs (q, x) and nothing else; they never look inside a body. A `Body` is a frozen JAX pytree, so
+it runs under ``jit``, ``vmap`` and ``scan``; what can't (a plant in physics, a real robot, any callable)
+answers the same question one call at a time (`Plant`).
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """A rigid chain of revolute and prismatic axes, described once, as frozen arrays.
 
 Frames are chosen so that every axis turns about, or slides along, its own z: the tip's transform is
-``T(q) = before[0] Z(m_0) before[1] Z(m_1) ... tip`` with constant ``before`` and ``Z`` a turn about or a slide along z.
-What a file or a table calls an axis in another direction is folded into the constants.
-A mimic joint is an axis whose motion is ``m = gain @ q + offset`` of the actuated joints.
+``T(q) = before[0] Z(m_0) before[1] Z(m_1) ... tip`` with constant ``before`` and ``Z`` a turn about z or a
+slide along it. What a file or a table calls an axis in another direction is folded into the constants. A
+mimic joint is an axis whose motion is ``m = gain @ q + offset`` of the actuated joints.
 """
 
 from __future__ import annotations
@@ -57,8 +57,8 @@ class Chain(Body):
     def forward(self, q: Float[Array, " joints"]) -> Float[Array, " space"]:
         """Tip position [m] for joint values q [rad or m].
 
-        Works backwards from the tip, on one point instead of whole transforms: five multiplications less an axis for
-        every one that `pose` makes, which is what the learning loop spends its time on.
+        Works backwards from the tip, on one point instead of whole transforms: this is what the learning loop
+        spends its time on.
         """
         motion = self.gain @ q + self.offset
         slide = motion * self.slides
@@ -76,9 +76,9 @@ class Chain(Body):
     def pose(self, q: Float[Array, " joints"]) -> Float[Array, "4 4"]:
         """Homogeneous transform from the base to the tip [m] for joint values q [rad or m]."""
         motion = self.gain @ q + self.offset
-        pose = jnp.eye(4)
-        for i in range(len(self.slides)):
-            pose = pose @ self.before[i] @ z_motion(motion[i], self.slides[i])
+        axes = self.before @ jax.vmap(z_motion)(motion, self.slides)
+        start = jnp.eye(4, dtype=axes.dtype)
+        pose, _ = jax.lax.scan(lambda frame, axis: (frame @ axis, None), start, axes)
         return pose @ self.tip
 
 

@@ -1,4 +1,4 @@
-"""Homogeneous transforms in float64, for the constants of a chain: they are computed once, when a robot is read."""
+"""Homogeneous transforms in float64, for the constants of a chain: computed once, when a robot is read."""
 
 from __future__ import annotations
 

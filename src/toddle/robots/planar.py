@@ -25,8 +25,8 @@ def planar(n: int, *, limit: float = math.pi / 2, length: float = 1.0) -> Chain:
         length: of the whole arm [m].
 
     Returns:
-        A chain whose tip has two coordinates; its home is a slight bend, 0.3 pi / N a joint (or half the limit
-        where that is less), away from the straight arm, where the tip can't move outwards.
+        A chain whose tip has two coordinates; its home is a slight bend, 0.3 pi / N a joint (or half the
+        limit, if less), away from the straight arm, where the tip can't move outwards.
 
     Raises:
         BadInput: n is not from 1 to 200, or the limit or length is not positive.

@@ -1,7 +1,7 @@
 """URDF files: the kinematics of a robot's description, and nothing else of it.
 
-Meshes, colours and masses are never looked at, so a missing mesh does not matter. The format's meaning follows
-http://wiki.ros.org/urdf/XML/joint.
+Meshes, colours and masses are never looked at, so a missing mesh does not matter. What the elements mean is
+defined at http://wiki.ros.org/urdf/XML/joint.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ import numpy as np
 from toddle.failures import BadInput, unknown_name
 from toddle.robots.chain import Chain
 from toddle.robots.frames import Transform, from_rpy, transform
-from toddle.robots.tree import Follows, Joint, Kind, Motion, chain, plant
-from toddle.robots.xml import number, numbers, parse, read_bytes
+from toddle.robots.markup import number, numbers, parse, read_bytes
+from toddle.robots.tree import Follows, Joint, Kind, Motion, plant
+from toddle.robots.walk import chain
 
 _KINDS = {
     "fixed": Kind.FIXED,
@@ -73,8 +74,7 @@ def _named(element: Element, where: str) -> str:
 
 def _joint(element: Element, where: str) -> Joint:
     name = _named(element, where)
-    label = f"joint {name!r}"
-    spot = f"{where}: {label}"
+    spot = f"{where}: joint {name!r}"
     kind = element.get("type", "")
     if kind not in _KINDS:
         raise unknown_name("joint type", kind, _KINDS, where=spot)
@@ -86,7 +86,7 @@ def _joint(element: Element, where: str) -> Joint:
             raise BadInput(f"it has no {tag} link", where=spot, remedy=f'give it <{tag} link="..."/>')
         return link
 
-    return Joint(name, _KINDS[kind], end("parent"), end("child"), lambda: _motion(element, kind, spot), label)
+    return Joint(name, _KINDS[kind], end("parent"), end("child"), lambda: _motion(element, kind, spot))
 
 
 def _motion(element: Element, kind: str, spot: str) -> Motion:
@@ -126,9 +126,8 @@ def _limits(element: Element, kind: str, spot: str) -> tuple[float, float] | Non
     limit = element.find("limit")
     if limit is None or (limit.get("lower") is None and limit.get("upper") is None):
         return None
-    return tuple(
-        number(limit, side, 0.0, f"{spot}, <limit>") for side in ("lower", "upper")
-    )  # 0: the format's default
+    where = f"{spot}, <limit>"
+    return number(limit, "lower", 0.0, where), number(limit, "upper", 0.0, where)  # 0 is the format's default
 
 
 def _follows(element: Element, spot: str) -> Follows | None:
