@@ -206,7 +206,24 @@ def test_no_mode_of_the_servoed_arm_oscillates_or_is_slow() -> None:
         roots = np.linalg.eigvals(motion)
         assert np.abs(roots.imag).max() < 0.01 * frequency
         assert roots.real.max() < -0.49 * frequency
+
+
+def test_the_servos_can_hold_twice_the_weight_however_slow_the_movements() -> None:
+    plant = nicu(sweep_s=100.0)
+    data = mujoco.MjData(plant.model)
+    for posture in postures(plant, 30, seed=5):
+        data.qpos[:] = posture
+        mujoco.mj_forward(plant.model, data)
         assert (plant.model.actuator_forcerange[:, 1] > 2 * np.abs(data.qfrc_bias)).all()
+
+
+def test_a_movement_takes_its_share_of_a_sweep_and_the_time_to_settle() -> None:
+    plant = single_link(half=1.0, sweep_s=2.0, settle_s=0.5)
+    for start, end, share in ((-1.0, 1.0, 1.0), (1.0, 0.5, 0.25), (0.5, 0.5, 0.025)):
+        plant.move([start])
+        before = plant.seconds
+        plant.move([end])
+        assert 2.0 * share <= plant.seconds - before + 1e-9 <= 2.0 * share + 0.5
 
 
 def test_the_sensor_has_the_noise_that_was_asked_for() -> None:
