@@ -7,6 +7,8 @@ WORKERS ?= 2
 
 # An installed interpreter is taken where one is new enough; uv fetches one only where there is none.
 export UV_PYTHON_PREFERENCE ?= system
+export NO_MKDOCS_2_WARNING = 1
+export PYRIGHT_PYTHON_IGNORE_WARNINGS = 1
 unexport VIRTUAL_ENV
 
 # $(call stage,NAME,COMMAND): run COMMAND and print how long it took.

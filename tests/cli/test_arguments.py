@@ -148,7 +148,7 @@ def test_no_words_whatever_end_in_a_traceback(words: list[str]) -> None:
         read(*words)
     except (BadInput, SystemExit) as ending:
         line = ending.line if isinstance(ending, BadInput) else ""  # a SystemExit is the help's
-        assert len(line.splitlines()) <= 1  # noqa: PT017
+        assert len(line.splitlines()) <= 1
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False, width=32), st.integers(-(10**9), 10**9))
