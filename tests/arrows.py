@@ -117,7 +117,7 @@ def _forbidden_call(module: Module, call: ast.Call) -> str:
         return f"{name} runs what a stranger wrote"
     if any(keyword.arg == "allow_pickle" for keyword in call.keywords):
         return "pickle runs what a stranger wrote"
-    if "import_module" in (name, method) and module.top not in ("cli", "") and not _stays_inside(call):
+    if "import_module" in (name, method) and module.top not in ("cli", "") and not _tells_its_package(call):
         return "a dynamic import hides an arrow"
     if module.top in EDGE:
         return ""
@@ -128,9 +128,13 @@ def _forbidden_call(module: Module, call: ast.Call) -> str:
     return ""
 
 
-def _stays_inside(call: ast.Call) -> bool:
-    """Whether a dynamic import names a module below its own package: ``f"{__name__}.{module}"``."""
-    return bool(call.args) and ast.unparse(call.args[0]).startswith("f'{__name__}.")
+def _tells_its_package(call: ast.Call) -> bool:
+    """Whether a dynamic import stays in its own package (``f"{__name__}.{part}"``) or in a stranger's."""
+    named = ast.unparse(call.args[0]).lstrip("f").strip("'\"") if call.args else ""
+    top, dot, _ = named.partition(".")
+    return top == "{__name__}" or (
+        bool(dot) and top.isidentifier() and top not in {"toddle", *ONLY_IN, *UNSAFE_MODULES}
+    )
 
 
 def _writes(call: ast.Call) -> bool:

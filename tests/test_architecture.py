@@ -24,6 +24,7 @@ def test_the_tree_keeps_the_design() -> None:
 def test_a_tree_that_keeps_the_design_has_no_fault(tmp_path: Path) -> None:
     _plant(tmp_path, "reach/loop.py", "import numpy as np\nfrom toddle.robots import body\nopen('a.txt')")
     _plant(tmp_path, "robots/__init__.py", "import importlib\nimportlib.import_module(f'{__name__}.{part}')")
+    _plant(tmp_path, "robots/strangers.py", "importlib.import_module(f'robot_descriptions.{name}')")
     _plant(tmp_path, "robots/body.py", "from toddle.signals import Movement\nimport mujoco")
     _plant(tmp_path, "signals.py", "from toddle.failures import BadInput\nfrom .geometry import frames")
     _plant(tmp_path, "geometry/frames.py", "text = 'pickle'.replace('a', 'b')")
@@ -74,6 +75,9 @@ PLANTS = {
         "import importlib\nimportlib.import_module('x')",
         "hides an arrow",
     ),
+    "hidden behind a name": ("reach/a.py", "importlib.import_module(name)", "hides an arrow"),
+    "hidden behind our name": ("reach/a.py", "importlib.import_module(f'toddle.{name}')", "hides an arrow"),
+    "hidden behind half a name": ("reach/a.py", "importlib.import_module(f'{package}.a')", "hides an arrow"),
     "mujoco in a skill": ("reach/loop.py", "import mujoco", "mujoco is imported only in"),
     "mujoco in the page": ("outside/page.py", "from mujoco import viewer", "mujoco is imported only in"),
     "a plot in the learner": (
