@@ -50,7 +50,7 @@ setup: .venv/.ready-to-develop ## only set up
 
 clean: ## remove everything that can be made again
 	rm -rf .venv .tools .cache site dist .pytest_cache .ruff_cache .hypothesis
-	find src tests benchmarks examples -name __pycache__ -type d -prune -exec rm -rf {} +
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 .venv/.ready-to-run: pyproject.toml uv.lock | $(UV)
 	$(call stage,set-up,$(UV) sync --frozen --inexact --no-default-groups --quiet)
