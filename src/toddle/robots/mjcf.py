@@ -167,7 +167,7 @@ def _motion(
 
 def _is_locked(model: mujoco.MjModel, i: int, followers: dict[int, int]) -> bool:
     """Whether an equality holds the joint to a constant."""
-    return i in followers and model.eq_obj2id[followers[i]] < 0
+    return i in followers and int(model.eq_obj2id[followers[i]]) < 0
 
 
 def _followers(model: mujoco.MjModel, where: str) -> dict[int, int]:

@@ -1,7 +1,8 @@
 """A copy of an MJCF document with nothing in it but kinematics, its included files put in their places.
 
 Elements and attributes that are not listed here are dropped, so that no asset is ever needed. Every body gets
-a mass, for MuJoCo compiles no moving body without one, and kinematics does not depend on it.
+a mass and every joint an inertia, for MuJoCo compiles nothing that moves without; kinematics depends on
+neither.
 """
 
 from __future__ import annotations
@@ -135,12 +136,14 @@ def _copy_children(old: Element, new: Element, source: _Source, *, depth: int) -
             _copy_children(child, kept, source, depth=depth + 1)
             if child.tag == "body":
                 SubElement(kept, "inertial", pos="0 0 0", mass="1", diaginertia="1 1 1")
+            elif child.tag == "joint" and new.tag == "body":
+                kept.set("armature", "1")
 
 
 def _attributes(element: Element, inside: str, where: str) -> dict[str, str]:
     """The attributes that kinematics needs, their numbers checked: MuJoCo takes NaN for a number."""
     names = _IN_EQUALITY if inside == "equality" else _KEPT[element.tag]
     spot = f"{where}: <{element.tag} name={element.get('name', '')!r}>"
-    for name in names & _NUMBERS & element.keys():
+    for name in names & _NUMBERS & set(element.keys()):
         values(element, name, spot)
     return {name: text for name, text in element.items() if name in names}
