@@ -72,9 +72,7 @@ def around(
     span = np.full_like(span, span.max()) if isotropic else np.maximum(span, 1e-3 * span.max())
     middle = (low + high) / 2
     as_array = lambda values: jnp.asarray(values, jnp.float32)  # noqa: E731
-    return UnitBox(
-        as_array(lower), as_array(upper - lower), as_array(middle - span / 2), as_array(span)
-    )
+    return UnitBox(as_array(lower), as_array(upper - lower), as_array(middle - span / 2), as_array(span))
 
 
 @eqx.filter_jit

@@ -50,6 +50,8 @@ class GoalAndMotorBabbling(Explorer):
     ends: Literal["any", "all"] = eqx.field(static=True, default="any")
     draws: Literal["signs", "uniform"] = eqx.field(static=True, default="signs")
     restart: Literal["last", "home"] = eqx.field(static=True, default="last")
+    stall: float = eqx.field(static=True, default=0.1)
+    follows: Literal["reached", "goal"] = eqx.field(static=True, default="reached")
 
     def init(self, home: Home) -> LineState:
         """The first line begins at home."""
@@ -82,4 +84,7 @@ class GoalAndMotorBabbling(Explorer):
         self, state: LineState, proposal: Proposal, x: Float[Array, " space"], home: Home
     ) -> tuple[LineState, Float[Array, ""]]:
         """The line goes on from where the tip came to be."""
-        return state._replace(position=x), jnp.float32(1.0)
+        stalled = jnp.sum((x - state.position) ** 2) < self.stall**2 * jnp.sum(state.goal_step**2)
+        ended = state.ended | stalled
+        position = x if self.follows == "reached" else jnp.where(ended, x, proposal.goal)
+        return state._replace(position=position, ended=ended), jnp.float32(1.0)

@@ -16,9 +16,7 @@ class Learner(eqx.Module):
     """``init / update / predict``; the state is a pytree of arrays, returned and never kept (unit box)."""
 
     @abstractmethod
-    def init(
-        self, key: jax.Array, home_x: Float[Array, " space"], home_q: Float[Array, " joints"]
-    ) -> State:
+    def init(self, key: jax.Array, home_x: Float[Array, " space"], home_q: Float[Array, " joints"]) -> State:
         """A state that answers the home posture at home."""
 
     @abstractmethod
