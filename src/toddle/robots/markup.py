@@ -34,9 +34,9 @@ def read_bytes(path: Path) -> bytes:
                 remedy="a robot's description is smaller: name that file, not a mesh",
             )
         text = path.read_bytes()
-    except (OSError, ValueError) as error:
+    except OSError as error:
         raise BadInput(
-            f"the file can't be read: {error}", where=where, remedy="check the path and its rights"
+            f"the file can't be read: {error.strerror}", where=where, remedy="check the path and its rights"
         ) from None
     if not text.strip():
         raise BadInput("the file is empty", where=where, remedy="name a URDF or MJCF file")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -67,7 +68,7 @@ def _compiled(text: str, where: str) -> mujoco.MjModel:
         try:
             return mujoco.MjModel.from_xml_string(text)
         except ValueError as error:
-            reason = " ".join(str(error).split()).removeprefix("Error: ").removeprefix("XML Error: ")
+            reason = re.sub(r"^((XML )?Error: )+", "", " ".join(str(error).split()))
             raise BadInput(
                 f"MuJoCo can't read it: {reason}",
                 where=where,
@@ -158,8 +159,9 @@ def _motion(
         value = float(model.eq_data[followers[i], 0])
         turn = transform(turning_z_to(axis), np.zeros(3))
         return Motion(origin @ turn @ z_motion(value, slides=not hinge) @ turn.T, axis)
-    if model.jnt_limited[i]:
-        limits = (float(model.jnt_range[i, 0]), float(model.jnt_range[i, 1]))
+    lower, upper = (float(limit) for limit in model.jnt_range[i])
+    if model.jnt_limited[i] or lower > upper:  # MuJoCo takes limits in the wrong order for none
+        limits = (lower, upper)
     else:
         limits = (reference - math.pi, reference + math.pi) if hinge else None
     return Motion(origin, axis, limits, _follows(model, i, followers, where), reference)

@@ -29,7 +29,7 @@ _KEPT = {
 }
 _IN_EQUALITY = {"name", "class", "joint1", "joint2", "polycoef", "active"}
 _NUMBERS = {"axis", "range", "ref", "fromto", "polycoef", *_ORIENTED}
-_DEEPEST, _MOST_FILES = 400, 100
+_DEEPEST, _MOST_FILES = 150, 100
 
 
 @dataclass(frozen=True)

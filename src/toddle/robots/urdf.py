@@ -112,12 +112,12 @@ def _axis(element: Element, spot: str) -> np.ndarray:
     if found is None:
         return np.array([1.0, 0.0, 0.0])
     axis = np.array(numbers(found, "xyz", (1.0, 0.0, 0.0), f"{spot}, <axis>"))
-    length = float(np.linalg.norm(axis))
-    if not 1e-9 < length < math.inf:
+    largest = float(np.abs(axis).max())
+    if largest < 1e-9:
         raise BadInput(
             "its axis has no direction", where=f"{spot}, <axis>", remedy="give it one, such as 0 0 1"
         )
-    return axis / length
+    return axis / largest / np.linalg.norm(axis / largest)
 
 
 def _limits(element: Element, kind: str, spot: str) -> tuple[float, float] | None:
