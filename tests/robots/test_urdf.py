@@ -41,7 +41,7 @@ def _unfused(path: Path) -> mujoco.MjModel:
 
 @pytest.mark.parametrize(
     ("spec", "base", "tip"),
-    [("nicu", "torso", "tip"), ("suralp", "torso", "tip"), ("icub_arm", "chest", "r_hand")],
+    [("nicu", "torso", "tip"), ("suralp", "torso", "tip"), ("icub_arm", "chest", "r_hand_dh_frame")],
 )
 def test_a_known_arm_agrees_with_mujoco(
     mujoco_pose: Pose, answer: Answer, spec: str, base: str, tip: str
@@ -73,7 +73,7 @@ def test_the_icub_can_start_at_its_root_or_at_its_other_hand(mujoco_pose: Pose, 
         assert len(chain.joints) == joints
         q = _random_q(chain, np.random.default_rng(1), 3)
         values = [dict(zip(chain.joints, row, strict=True)) for row in q]
-        expected = np.array([mujoco_pose(model, base, "r_hand", row) for row in values])
+        expected = np.array([mujoco_pose(model, base, "r_hand_dh_frame", row) for row in values])
         np.testing.assert_allclose(answer(chain, q)[1], expected, atol=SINGLE)
 
 

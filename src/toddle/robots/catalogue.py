@@ -98,7 +98,7 @@ def describe() -> tuple[Robot, ...]:
 
 
 def _looks_like_a_file(spec: str) -> bool:
-    return bool(Path(spec).suffix) or os.sep in spec or Path(spec).exists()
+    return bool(spec) and (bool(Path(spec).suffix) or os.sep in spec or Path(spec).exists())
 
 
 def _read(path: Path, choice: Choice) -> Body:

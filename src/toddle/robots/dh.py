@@ -57,29 +57,32 @@ def from_table(name: str, rows: Sequence[Row], *, coordinates: tuple[int, ...] =
         coordinates: which of x, y, z the tip's position is reported in.
 
     Raises:
-        BadInput: there is no row, a number is not finite, or a home lies outside its limits.
+        BadInput: there is no row, a number is not finite, or limits and home do not fit.
     """
     if not rows:
         raise BadInput("the table has no row", where=name, remedy="give one row a joint")
     for row in rows:
         values = (row.theta, row.d, row.a, row.alpha, *row.limits, row.home)
-        if not np.all(np.isfinite(values)) or not row.limits[0] <= row.home <= row.limits[1]:
+        (lower, upper), where = row.limits, f"{name}: joint {row.joint!r}"
+        if not np.all(np.isfinite(values)):
+            raise BadInput("its row is not finite", where=where, remedy="give numbers")
+        if not lower < upper or not lower <= row.home <= upper:
             raise BadInput(
-                f"row {row} is not finite, or its home is outside its limits",
-                where=f"{name}: joint {row.joint!r}",
-                remedy="give finite numbers, with the home inside the limits",
+                f"its limits {lower:g}, {upper:g} do not rise, or its home {row.home:g} lies outside",
+                where=where,
+                remedy="give a lower and an upper limit with the home between them",
             )
     before, rigid = [], np.eye(4)
     for row in rows:
         # Both motions are along or about the same z, so the constant one may come first.
         before.append(rigid @ z_motion(row.theta, slides=False) @ z_motion(row.d, slides=True))
         rigid = _link(row)
-    lower, upper = np.array([row.limits for row in rows], dtype=np.float32).T
+    limits = np.array([row.limits for row in rows], dtype=np.float32)
     return Chain(
         name=name,
         joints=tuple(row.joint for row in rows),
-        lower=jnp.asarray(lower),
-        upper=jnp.asarray(upper),
+        lower=jnp.asarray(limits[:, 0]),
+        upper=jnp.asarray(limits[:, 1]),
         home=jnp.asarray([row.home for row in rows], jnp.float32),
         before=jnp.asarray(np.array(before, dtype=np.float32)),
         slides=jnp.asarray([float(row.moves == "d") for row in rows], jnp.float32),

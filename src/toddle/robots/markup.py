@@ -12,6 +12,7 @@ from defusedxml.common import DefusedXmlException
 from toddle.failures import BadInput
 
 MAX_BYTES = 20_000_000
+LARGEST = 1e6  # [m or rad] no arm is larger, and single precision could not compute it
 
 
 def read_bytes(path: Path) -> bytes:
@@ -65,7 +66,7 @@ def values(element: Element, attribute: str, where: str) -> tuple[float, ...]:
     """The numbers of an attribute; none where it is absent.
 
     Raises:
-        BadInput: one is not a finite number.
+        BadInput: one is not a finite number, or too large for any robot.
     """
     text = element.get(attribute, "")
     return tuple(_finite(word, _spot(where, attribute, text)) for word in text.split())
@@ -103,5 +104,9 @@ def _finite(word: str, where: str) -> float:
     if not math.isfinite(value) or "_" in word:  # 1_0 is a number to Python only
         raise BadInput(
             f"{word[:40]!r} is not a finite number", where=where, remedy="write it in plain decimals"
+        )
+    if abs(value) > LARGEST:
+        raise BadInput(
+            f"{word[:40]!r} is too large", where=where, remedy=f"give less than {LARGEST:g} m or rad"
         )
     return value

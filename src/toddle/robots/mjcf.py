@@ -68,11 +68,12 @@ def _compiled(text: str, where: str) -> mujoco.MjModel:
         try:
             return mujoco.MjModel.from_xml_string(text)
         except ValueError as error:
-            reason = re.sub(r"^((XML )?Error: )+", "", " ".join(str(error).split()))
+            # Its line numbers are those of the copy, and lead nobody anywhere.
+            reason = re.sub(r"^((XML )?Error: )+|, line \d+", "", " ".join(str(error).split()))
             raise BadInput(
                 f"MuJoCo can't read it: {reason}",
                 where=where,
-                remedy="mend that element (lines are counted without geoms and assets)",
+                remedy="mend that element",
             ) from None
 
 

@@ -73,6 +73,8 @@ class _Source:
         """
         name = element.get("file") or ""
         where = f"{self.where}: <include file={name!r}>"
+        if not name:
+            raise BadInput("it names no file", where=where, remedy='write <include file="..."/>')
         folder = self.path.resolve().parent
         file = (folder / name).resolve()
         if not file.is_relative_to(folder):
@@ -143,7 +145,8 @@ def _copy_children(old: Element, new: Element, source: _Source, *, depth: int) -
 def _attributes(element: Element, inside: str, where: str) -> dict[str, str]:
     """The attributes that kinematics needs, their numbers checked: MuJoCo takes NaN for a number."""
     names = _IN_EQUALITY if inside == "equality" else _KEPT[element.tag]
-    spot = f"{where}: <{element.tag} name={element.get('name', '')!r}>"
+    called = f" name={element.get('name')!r}" if element.get("name") else ""
+    spot = f"{where}: <{element.tag}{called}>"
     for name in names & _NUMBERS & set(element.keys()):
         values(element, name, spot)
     return {name: text for name, text in element.items() if name in names}

@@ -20,13 +20,16 @@ from toddle.robots import files
 from toddle.robots.chain import Chain
 
 ICUB_MODEL = "iCubGazeboV2_5"
+ICUB_TIP = (
+    "r_hand_dh_frame"  # in the palm; r_hand itself sits in the wrist, where the last joint can't move it
+)
 
 
 def icub_arm(tip: str | None = None, base: str | None = None, joints: Sequence[str] | None = None) -> Chain:
     """The right arm of the iCub, from its chest to its hand: seven joints.
 
     Args:
-        tip: another link to watch; None: ``r_hand``.
+        tip: another link to watch; None: ``r_hand_dh_frame``, in the palm.
         base: another link to start from; None: ``chest``. From ``root_link`` the three joints of the torso
             join in.
         joints: names of the actuated joints; None: all of them.
@@ -39,7 +42,7 @@ def icub_arm(tip: str | None = None, base: str | None = None, joints: Sequence[s
     except ImportError:
         raise MissingExtra("icub-models", "icub", what_for="icub_arm") from None
     path = Path(icub_models.get_model_file(ICUB_MODEL))
-    arm = files.read(path, tip=tip or "r_hand", base=base or "chest", joints=joints)
+    arm = files.read(path, tip=tip or ICUB_TIP, base=base or "chest", joints=joints)
     return replace(arm, name="icub_arm")
 
 
