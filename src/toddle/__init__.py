@@ -1,1 +1,45 @@
-"""A robot that learns to reach and to walk."""
+"""A robot that learns to reach and to walk.
+
+    robot = toddle.load("nicu")
+    skill = toddle.learn(robot, samples=20_000, seed=0)
+    answer = toddle.solve(skill, [0.25, -0.25, 0.75])
+
+Names are resolved when they are first used, so that importing the package costs nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from toddle.outside.skills import load_skill as load_skill
+    from toddle.outside.skills import save as save
+    from toddle.reach.api import evaluate as evaluate
+    from toddle.reach.api import learn as learn
+    from toddle.reach.skill import Skill as Skill
+    from toddle.reach.skill import solve as solve
+    from toddle.robots.catalogue import load as load
+    from toddle.signals import Solution as Solution
+    from toddle.signals import Verdict as Verdict
+
+_HOMES = {
+    "load": "robots.catalogue",
+    "learn": "reach.api",
+    "evaluate": "reach.api",
+    "solve": "reach.skill",
+    "Skill": "reach.skill",
+    "save": "outside.skills",
+    "load_skill": "outside.skills",
+    "Solution": "signals",
+    "Verdict": "signals",
+}
+
+__all__ = ["Skill", "Solution", "Verdict", "evaluate", "learn", "load", "load_skill", "save", "solve"]
+
+
+def __getattr__(name: str) -> object:
+    """Import a public name's module when the name is first asked for (PEP 562)."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)

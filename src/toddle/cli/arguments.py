@@ -68,9 +68,7 @@ def _read(options: tuple[Option, ...], words: list[str], prog: str) -> dict[str,
         else:
             option, fixed = flags[name]
             if fixed is not None and equals:
-                raise BadInput(
-                    f"takes no value, got {shown(attached)}", where=name, remedy=f"write {name} alone"
-                )
+                raise BadInput(f"takes no value, got {shown(attached)}", where=name, remedy=f"write {name} alone")
             attachments = [attached] if equals else None
             value = fixed if fixed is not None else option.convert(attachments or _values(option, words))
         if option.name in given:

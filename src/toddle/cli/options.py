@@ -99,9 +99,7 @@ def options_of(config: type) -> tuple[Option, ...]:
     """The options of a dataclass, in the order of its fields."""
     hints = typing.get_type_hints(config, include_extras=True)
     about = _attributes(config.__doc__ or "")
-    return tuple(
-        _option(f.name, hints[f.name], _default(f), about.get(f.name, "")) for f in fields(config) if f.init
-    )
+    return tuple(_option(f.name, hints[f.name], _default(f), about.get(f.name, "")) for f in fields(config) if f.init)
 
 
 def shown(word: str) -> str:

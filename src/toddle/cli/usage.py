@@ -18,9 +18,7 @@ def usage(config: type, options: tuple[Option, ...], prog: str) -> str:
     places = [o.words if o.default is MISSING else f"[{o.words}]" for o in options if o.positional]
     purpose = (config.__doc__ or "").split("Attributes:")[0].strip()
     blocks = [" ".join(["usage:", prog, *places, "[options]"]), *_paragraphs(purpose, width)]
-    blocks.append(
-        "\n".join(_line(option, width) for option in sorted(options, key=lambda o: not o.positional))
-    )
+    blocks.append("\n".join(_line(option, width) for option in sorted(options, key=lambda o: not o.positional)))
     return "\n\n".join(blocks)
 
 

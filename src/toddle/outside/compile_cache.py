@@ -37,9 +37,7 @@ def use_compile_cache(environment: MutableMapping[str, str] | None = None) -> Pa
 
 def cache_home(environment: MutableMapping[str, str]) -> Path:
     """Where toddle keeps what it can make again: XDG_CACHE_HOME, or ~/.cache, and ``toddle`` in it."""
-    home = (
-        environment.get("XDG_CACHE_HOME") or Path(environment.get("HOME", os.path.expanduser("~"))) / ".cache"
-    )
+    home = environment.get("XDG_CACHE_HOME") or Path(environment.get("HOME", os.path.expanduser("~"))) / ".cache"
     return Path(home) / "toddle"
 
 

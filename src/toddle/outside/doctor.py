@@ -108,9 +108,7 @@ def _gl_backend() -> Finding:
     chosen = os.environ.get("MUJOCO_GL")
     if chosen in (None, "") or chosen in working:
         return Finding("GL backend", True, ", ".join(working))
-    return Finding(
-        "GL backend", False, f"MUJOCO_GL={chosen} draws nothing", remedy=f"export MUJOCO_GL={working[0]}"
-    )
+    return Finding("GL backend", False, f"MUJOCO_GL={chosen} draws nothing", remedy=f"export MUJOCO_GL={working[0]}")
 
 
 def _cache() -> Finding:
@@ -135,9 +133,7 @@ def _port() -> Finding:
 def _machine() -> Finding:
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
-    return Finding(
-        "machine", True, f"{cores} cores, {memory:.0f} GiB, {platform.system()} {platform.machine()}"
-    )
+    return Finding("machine", True, f"{cores} cores, {memory:.0f} GiB, {platform.system()} {platform.machine()}")
 
 
 def _ffmpeg() -> Finding:

@@ -124,7 +124,7 @@ def score(
     key = jax.random.fold_in(progress.key, 1)
     seen = setting.box.x_from_unit(draw_seen(progress.seen, key, len(targets)))
     return Scores(
-        progress.seen.count,
+        progress.seen.total,
         jnp.mean(open_loop_errors(setting, body, progress, targets)),
         jnp.mean(open_loop_errors(setting, body, progress, seen)),
         coverage(progress.seen, reachable_cells),

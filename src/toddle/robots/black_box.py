@@ -53,20 +53,14 @@ class CallablePlant:
         """
         self.name, self.joints = name, tuple(joints)
         if not self.joints or len(set(self.joints)) < len(self.joints):
-            raise BadInput(
-                f"joints {self.joints} are none, or repeat", where=name, remedy="name every joint once"
-            )
+            raise BadInput(f"joints {self.joints} are none, or repeat", where=name, remedy="name every joint once")
         self.lower, self.upper = self._vector("lower", lower), self._vector("upper", upper)
         if not (self.lower < self.upper).all():
             worst = self.joints[int(np.argmin(self.upper - self.lower))]
-            raise BadInput(
-                f"the limits of {worst} are not in order", where=name, remedy="lower must be below upper"
-            )
+            raise BadInput(f"the limits of {worst} are not in order", where=name, remedy="lower must be below upper")
         self.home = (self.lower + self.upper) / 2 if home is None else self._vector("home", home)
         if not ((self.home >= self.lower) & (self.home <= self.upper)).all():
-            raise BadInput(
-                "home is outside the limits", where=name, remedy="choose it between lower and upper"
-            )
+            raise BadInput("home is outside the limits", where=name, remedy="choose it between lower and upper")
         self.moves = 0
         self._function = function
         self._space: int | None = None
@@ -111,9 +105,7 @@ class CallablePlant:
         try:
             vector = np.array(values, dtype=float)
         except (TypeError, ValueError) as error:
-            raise BadInput(
-                f"{argument} = {_short(values)} is no vector", where=self.name, remedy=remedy
-            ) from error
+            raise BadInput(f"{argument} = {_short(values)} is no vector", where=self.name, remedy=remedy) from error
         if vector.shape != (len(self.joints),) or not np.isfinite(vector).all():
             raise BadInput(f"{argument} = {_short(vector)} cannot be used", where=self.name, remedy=remedy)
         return vector

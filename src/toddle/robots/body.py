@@ -8,7 +8,8 @@ answers the same question one call at a time (`Plant`).
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Protocol
+from collections.abc import Mapping
+from typing import Protocol, runtime_checkable
 
 import equinox as eqx
 import numpy as np
@@ -45,4 +46,17 @@ class Plant(Protocol):
 
     def move(self, q: np.ndarray) -> np.ndarray:
         """Go to the joint values q [rad or m] and return the observed tip position [m]."""
+        ...
+
+
+@runtime_checkable
+class Resumable(Protocol):
+    """A plant whose state can be taken down and restored, so that an interrupted run goes on bit for bit."""
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Everything that the next movement depends on, as arrays by name."""
+        ...
+
+    def restore(self, state: Mapping[str, np.ndarray]) -> None:
+        """Go back to a state that was taken down."""
         ...

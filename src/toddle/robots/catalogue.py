@@ -72,7 +72,11 @@ def load(
     Raises:
         BadInput: there is no such robot or file, or it can't be used.
     """
-    choice = Choice(os.fspath(spec), tip, base, joints)
+    return load_choice(Choice(os.fspath(spec), tip, base, joints))
+
+
+def load_choice(choice: Choice) -> Body:
+    """The body that was asked for; see `load`."""
     robot = record(choice.spec)
     if robot is not None:
         return robot.build(choice)
@@ -123,9 +127,7 @@ def _whole(choice: Choice) -> None:
     """Refuse to cut a robot that has one base, one tip and no names of parts."""
     for what in ("tip", "base", "joints"):
         if getattr(choice, what) is not None:
-            raise BadInput(
-                f"its {what} can't be chosen", where=choice.spec, remedy=f"leave {what} out, or name a file"
-            )
+            raise BadInput(f"its {what} can't be chosen", where=choice.spec, remedy=f"leave {what} out, or name a file")
 
 
 def _nicu(choice: Choice) -> Body:
@@ -148,9 +150,7 @@ def _planar(choice: Choice) -> Body:
     _whole(choice)
     count = choice.spec.partition(":")[2]
     if not (count.isascii() and count.isdecimal() and len(count) < 10):
-        raise BadInput(
-            f"N is {count!r}", where=choice.spec, remedy="give a number of joints, such as planar:5"
-        )
+        raise BadInput(f"N is {count!r}", where=choice.spec, remedy="give a number of joints, such as planar:5")
     return planar.planar(int(count))
 
 

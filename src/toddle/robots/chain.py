@@ -15,9 +15,7 @@ from jaxtyping import Array, Float
 
 from toddle.robots.body import Body
 
-_UNROLL = (
-    16  # longer chains loop over their axes: a compiled line for each of 50 axes takes longer than it saves
-)
+_UNROLL = 16  # longer chains loop over their axes: a compiled line for each of 50 axes takes longer than it saves
 
 
 class Chain(Body):

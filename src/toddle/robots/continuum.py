@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -50,24 +51,25 @@ class Continuum(Body):
 
     def forward(self, q: Float[Array, " joints"]) -> Float[Array, "3"]:
         """Tip position [m] in the base frame, z along the straight arm, for actuator lengths q [m]."""
-        point = jnp.zeros(3, q.dtype)
-        for i in reversed(range(len(self.radii))):
-            turn, shift = segment(q[3 * i : 3 * i + 3], self.radii[i])
-            point = turn @ point + shift
+        turns, shifts = self._segments(q)
+        point = shifts[-1]
+        for i in reversed(range(len(self.radii) - 1)):
+            point = turns[i] @ point + shifts[i]
         return point
 
     def pose(self, q: Float[Array, " joints"]) -> Float[Array, "4 4"]:
         """Homogeneous transform from the base to the tip [m] for actuator lengths q [m]."""
-        pose = jnp.eye(4, dtype=q.dtype)
-        for i in range(len(self.radii)):
-            turn, shift = segment(q[3 * i : 3 * i + 3], self.radii[i])
-            pose = pose @ jnp.eye(4, dtype=q.dtype).at[:3, :3].set(turn).at[:3, 3].set(shift)
-        return pose
+        turns, shifts = self._segments(q)
+        turn, shift = turns[0], shifts[0]
+        for i in range(1, len(self.radii)):
+            turn, shift = turn @ turns[i], turn @ shifts[i] + shift
+        return jnp.eye(4, dtype=q.dtype).at[:3, :3].set(turn).at[:3, 3].set(shift)
+
+    def _segments(self, q: Float[Array, " joints"]) -> tuple[Float[Array, "segments 3 3"], Float[Array, "segments 3"]]:
+        return jax.vmap(segment)(q.reshape(-1, 3), self.radii)
 
 
-def segment(
-    lengths: Float[Array, "3"], radius: Float[Array, ""]
-) -> tuple[Float[Array, "3 3"], Float[Array, "3"]]:
+def segment(lengths: Float[Array, "3"], radius: Float[Array, ""]) -> tuple[Float[Array, "3 3"], Float[Array, "3"]]:
     """Turn and shift [m] from a segment's foot to its head, for its actuator lengths [m] at a radius [m]."""
     second, third = lengths[1] - lengths[0], lengths[2] - lengths[0]
     arc = lengths[0] + (second + third) / 3  # the mean, without rounding where all are equal

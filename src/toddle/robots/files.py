@@ -13,9 +13,7 @@ SUFFIXES = (".urdf", ".xml", ".mjcf")
 _XACRO = "{http://www.ros.org/wiki/xacro}"
 
 
-def read(
-    path: Path, *, tip: str | None = None, base: str | None = None, joints: Sequence[str] | None = None
-) -> Chain:
+def read(path: Path, *, tip: str | None = None, base: str | None = None, joints: Sequence[str] | None = None) -> Chain:
     """The chain of a URDF or MJCF file; see `urdf.read_urdf` and `mjcf.read_mjcf`.
 
     Raises:

@@ -102,11 +102,7 @@ def _finite(word: str, where: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value) or "_" in word:  # 1_0 is a number to Python only
-        raise BadInput(
-            f"{word[:40]!r} is not a finite number", where=where, remedy="write it in plain decimals"
-        )
+        raise BadInput(f"{word[:40]!r} is not a finite number", where=where, remedy="write it in plain decimals")
     if abs(value) > LARGEST:
-        raise BadInput(
-            f"{word[:40]!r} is too large", where=where, remedy=f"give less than {LARGEST:g} m or rad"
-        )
+        raise BadInput(f"{word[:40]!r} is too large", where=where, remedy=f"give less than {LARGEST:g} m or rad")
     return value

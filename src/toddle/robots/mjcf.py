@@ -54,9 +54,7 @@ def read_mjcf(
     return chain_of(parse(read_bytes(path), str(path)), path, tip=tip, base=base, joints=joints)
 
 
-def chain_of(
-    root: Element, path: Path, *, tip: str | None, base: str | None, joints: Sequence[str] | None
-) -> Chain:
+def chain_of(root: Element, path: Path, *, tip: str | None, base: str | None, joints: Sequence[str] | None) -> Chain:
     """The chain of an MJCF's root element; see `read_mjcf`."""
     copy = stripped(root, path)
     tree = _tree(_compiled(copy.text, str(path)), copy, str(path))
@@ -106,9 +104,7 @@ def _tree(model: mujoco.MjModel, copy: Stripped, where: str) -> Tree:
         link = name if name not in links else f"site:{name}"
         origin = transform(from_quaternion(model.site_quat[i]), model.site_pos[i])
         holder = bodies[model.site_bodyid[i]]
-        joints.append(
-            Joint(f"(site {name})", Kind.FIXED, holder, link, lambda origin=origin: Motion(origin, _Z))
-        )
+        joints.append(Joint(f"(site {name})", Kind.FIXED, holder, link, lambda origin=origin: Motion(origin, _Z)))
         links.append(link)
     tree = plant(copy.name or Path(where).stem, where, links, joints)
     ends = tuple(bodies[i] for i in range(1, model.nbody) if i not in holders)
@@ -151,9 +147,7 @@ def _body_joints(
     return joints
 
 
-def _motion(
-    model: mujoco.MjModel, i: int, origin: np.ndarray, followers: dict[int, int], where: str
-) -> Motion:
+def _motion(model: mujoco.MjModel, i: int, origin: np.ndarray, followers: dict[int, int], where: str) -> Motion:
     reference = float(model.qpos0[model.jnt_qposadr[i]])
     axis, hinge = model.jnt_axis[i].copy(), model.jnt_type[i] == mujoco.mjtJoint.mjJNT_HINGE
     if _is_locked(model, i, followers):

@@ -24,7 +24,7 @@ _KEPT = {
     "frame": {"name", "childclass", *_ORIENTED},
     "joint": {"name", "class", "type", "pos", "axis", "range", "limited", "ref"},
     "freejoint": {"name"},
-    "site": {"name", "class", "fromto", *_ORIENTED},
+    "site": {"name", "class", "type", "size", "fromto", *_ORIENTED},
     "equality": set[str](),
 }
 _IN_EQUALITY = {"name", "class", "joint1", "joint2", "polycoef", "active"}
@@ -86,9 +86,7 @@ class _Source:
         if file in self.opened or file == self.path.resolve():
             raise BadInput("the file is included twice", where=where, remedy="include each file once")
         if len(self.opened) >= _MOST_FILES:
-            raise BadInput(
-                f"more than {_MOST_FILES} files are included", where=where, remedy="join some of them"
-            )
+            raise BadInput(f"more than {_MOST_FILES} files are included", where=where, remedy="join some of them")
         self.opened.append(file)
         shown = self.path.parent / name
         return parse(read_bytes(shown), str(shown))
@@ -109,9 +107,7 @@ def stripped(root: Element, path: Path) -> Stripped:
     copy = Element("mujoco")
     _copy_children(root, copy, source, depth=0)
     if copy.find("worldbody") is None:
-        raise BadInput(
-            "the model has no <worldbody>", where=source.where, remedy="name a file with bodies in it"
-        )
+        raise BadInput("the model has no <worldbody>", where=source.where, remedy="name a file with bodies in it")
     return Stripped(tostring(copy, encoding="unicode"), root.get("model", ""), source.home)
 
 

@@ -20,9 +20,7 @@ from toddle.robots import files
 from toddle.robots.chain import Chain
 
 ICUB_MODEL = "iCubGazeboV2_5"
-ICUB_TIP = (
-    "r_hand_dh_frame"  # in the palm; r_hand itself sits in the wrist, where the last joint can't move it
-)
+ICUB_TIP = "r_hand_dh_frame"  # in the palm; r_hand itself sits in the wrist, where the last joint can't move it
 
 
 def icub_arm(tip: str | None = None, base: str | None = None, joints: Sequence[str] | None = None) -> Chain:
@@ -73,9 +71,7 @@ def full_name(name: str) -> str | None:
     return found[0] if found else None
 
 
-def described(
-    name: str, tip: str | None = None, base: str | None = None, joints: Sequence[str] | None = None
-) -> Chain:
+def described(name: str, tip: str | None = None, base: str | None = None, joints: Sequence[str] | None = None) -> Chain:
     """A robot of the package robot_descriptions, which fetches what is not here from the network.
 
     Args:
@@ -90,9 +86,7 @@ def described(
     module = _fetched(name)
     path = getattr(module, "URDF_PATH", None) or getattr(module, "MJCF_PATH", None)
     if not path:
-        raise BadInput(
-            "it has neither a URDF nor an MJCF file", where=name, remedy="choose another description"
-        )
+        raise BadInput("it has neither a URDF nor an MJCF file", where=name, remedy="choose another description")
     return files.read(Path(path), tip=tip, base=base, joints=joints)
 
 

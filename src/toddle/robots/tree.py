@@ -138,9 +138,7 @@ def plant(name: str, where: str, links: Sequence[str], joints: Sequence[Joint]) 
 def _refuse_twins(kind: str, names: Sequence[str], where: str) -> None:
     for name, count in Counter(names).items():
         if count > 1:
-            raise BadInput(
-                f"{count} {kind}s are named {name!r}", where=where, remedy="give each its own name"
-            )
+            raise BadInput(f"{count} {kind}s are named {name!r}", where=where, remedy="give each its own name")
 
 
 def _refuse_loops(above: Mapping[str, Joint], links: Sequence[str], where: str) -> None:

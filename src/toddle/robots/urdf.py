@@ -49,9 +49,7 @@ def read_urdf(
     return chain_of(parse(read_bytes(path), str(path)), str(path), tip=tip, base=base, joints=joints)
 
 
-def chain_of(
-    robot: Element, where: str, *, tip: str | None, base: str | None, joints: Sequence[str] | None
-) -> Chain:
+def chain_of(robot: Element, where: str, *, tip: str | None, base: str | None, joints: Sequence[str] | None) -> Chain:
     """The chain of a URDF's root element; see `read_urdf`."""
     if robot.tag != "robot":
         raise BadInput(
@@ -114,9 +112,7 @@ def _axis(element: Element, spot: str) -> np.ndarray:
     axis = np.array(numbers(found, "xyz", (1.0, 0.0, 0.0), f"{spot}, <axis>"))
     largest = float(np.abs(axis).max())
     if largest < 1e-9:
-        raise BadInput(
-            "its axis has no direction", where=f"{spot}, <axis>", remedy="give it one, such as 0 0 1"
-        )
+        raise BadInput("its axis has no direction", where=f"{spot}, <axis>", remedy="give it one, such as 0 0 1")
     return axis / largest / np.linalg.norm(axis / largest)
 
 

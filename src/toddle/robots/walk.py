@@ -21,9 +21,7 @@ from toddle.robots.frames import inverse, transform, turning_z_to, z_motion
 from toddle.robots.tree import Joint, Kind, Motion, Tree
 
 
-def chain(
-    tree: Tree, *, tip: str | None = None, base: str | None = None, joints: Sequence[str] | None = None
-) -> Chain:
+def chain(tree: Tree, *, tip: str | None = None, base: str | None = None, joints: Sequence[str] | None = None) -> Chain:
     """The chain from a base to a tip.
 
     Args:
@@ -111,9 +109,7 @@ class _Readings:
                 raise unknown_name("joint", rule.leader, self.joints, where=f"{spot}, its mimic")
             if rule.leader in seen:
                 ring = " -> ".join([*seen, rule.leader])
-                raise BadInput(
-                    f"mimic joints go in a circle: {ring}", where=spot, remedy="let one move by itself"
-                )
+                raise BadInput(f"mimic joints go in a circle: {ring}", where=spot, remedy="let one move by itself")
             if self.joints[rule.leader].kind not in (Kind.TURNS, Kind.SLIDES):
                 raise BadInput(
                     f"it mimics {rule.leader!r}, which is not a joint of one axis",
@@ -127,9 +123,7 @@ class _Readings:
     def limits(self, name: str) -> tuple[float, float]:
         limits = self.motion(name).limits
         if limits is None:
-            raise BadInput(
-                "it has no limits", where=self.spot(name), remedy="give it a lower and an upper limit"
-            )
+            raise BadInput("it has no limits", where=self.spot(name), remedy="give it a lower and an upper limit")
         lower, upper = limits
         if not lower < upper:
             raise BadInput(
@@ -198,9 +192,7 @@ def _chosen(readings: _Readings, movers: list[str], joints: Sequence[str]) -> li
     return [name for name in movers if name in joints]
 
 
-def _assemble(
-    readings: _Readings, path: list[_Step], drives: Mapping[str, _Drive], actuated: list[str]
-) -> Chain:
+def _assemble(readings: _Readings, path: list[_Step], drives: Mapping[str, _Drive], actuated: list[str]) -> Chain:
     """Multiply the constants of the path together, one product before each axis that moves."""
     rigid, still = np.eye(4), np.eye(4)
     before, slides, gains, offsets = [], [], [], []

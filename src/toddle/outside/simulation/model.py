@@ -57,9 +57,7 @@ def build(chain: Chain, options: PhysicsOptions) -> ArmModel:
     """
     arrays = (chain.lower, chain.upper, chain.home, chain.before, chain.gain, chain.offset, chain.tip)
     if not all(np.isfinite(np.asarray(array)).all() for array in arrays):
-        raise BadInput(
-            "a limit or a length is not finite", where=chain.name, remedy="give every joint finite limits"
-        )
+        raise BadInput("a limit or a length is not finite", where=chain.name, remedy="give every joint finite limits")
     gain, offset = np.asarray(chain.gain, float), np.asarray(chain.offset, float)
     low, high = axis_range(chain)
     moving = high - low > _STUCK

@@ -62,9 +62,7 @@ class PhysicsOptions:
             if getattr(self, name) <= 0:
                 raise _bad(name, getattr(self, name), "must be above zero")
         if self.natural_frequency_hz > _STIFFEST_HZ:
-            raise _bad(
-                "natural_frequency_hz", self.natural_frequency_hz, f"must be at most {_STIFFEST_HZ:g} Hz"
-            )
+            raise _bad("natural_frequency_hz", self.natural_frequency_hz, f"must be at most {_STIFFEST_HZ:g} Hz")
 
 
 def _bad(name: str, value: object, remedy: str) -> BadInput:

@@ -42,9 +42,7 @@ def tune(
     inertia, weight = loads(model, postures)
     frequency = 2 * math.pi * options.natural_frequency_hz
     stiffness, damping = frequency**2 * inertia, 2 * frequency * inertia
-    fastest = (
-        1.875 * (high - low) / options.sweep_s
-    )  # a minimum-jerk movement peaks at 15/8 of its mean speed
+    fastest = 1.875 * (high - low) / options.sweep_s  # a minimum-jerk movement peaks at 15/8 of its mean speed
     force = _HOLDING_MARGIN * weight + inertia * fastest * frequency
     model.actuator_gainprm[:, 0] = stiffness
     model.actuator_biasprm[:, 1] = -stiffness

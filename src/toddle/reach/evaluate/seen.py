@@ -21,13 +21,13 @@ class Seen(NamedTuple):
     """Visited positions in the unit box.
 
     Attributes:
-        positions: the kept ones; rows at and after `count` are not filled yet.
-        count: how many positions were visited in all.
+        positions: the kept ones; rows at and after `total` are not filled yet.
+        total: how many positions were visited in all.
         visited: which cells of a regular grid over the unit box were entered.
     """
 
     positions: Float[Array, "capacity space"]
-    count: Int[Array, ""]
+    total: Int[Array, ""]
     visited: Bool[Array, " cells"]
 
 
@@ -52,17 +52,15 @@ def cell_of(x: Float[Array, "*batch space"]) -> Int[Array, "*batch"]:
 
 def remember(seen: Seen, key: jax.Array, x: Float[Array, "chunk space"]) -> Seen:
     """The record after a chunk of visited positions."""
-    order = seen.count + jnp.arange(len(x))
-    slot = jnp.where(
-        order < CAPACITY, order, jax.random.randint(key, (len(x),), 0, jnp.maximum(order + 1, 1))
-    )
+    order = seen.total + jnp.arange(len(x))
+    slot = jnp.where(order < CAPACITY, order, jax.random.randint(key, (len(x),), 0, jnp.maximum(order + 1, 1)))
     positions = seen.positions.at[slot].set(x, mode="drop")
-    return Seen(positions, seen.count + len(x), seen.visited.at[cell_of(x)].set(True))
+    return Seen(positions, seen.total + len(x), seen.visited.at[cell_of(x)].set(True))
 
 
 def draw_seen(seen: Seen, key: jax.Array, count: int) -> Float[Array, "count space"]:
     """Positions drawn from those seen so far, with replacement; there must be at least one."""
-    filled = jnp.minimum(seen.count, CAPACITY)
+    filled = jnp.minimum(seen.total, CAPACITY)
     return seen.positions[jax.random.randint(key, (count,), 0, jnp.maximum(filled, 1))]
 
 
@@ -73,4 +71,4 @@ def coverage(seen: Seen, reachable_cells: Bool[Array, " cells"]) -> Float[Array,
 
 def kept(seen: Seen) -> Float[np.ndarray, "kept space"]:
     """The kept positions that are filled (unit box)."""
-    return np.asarray(seen.positions[: min(int(seen.count), CAPACITY)])
+    return np.asarray(seen.positions[: min(int(seen.total), CAPACITY)])

@@ -13,15 +13,12 @@ def spread_out(
     positions: Float[np.ndarray, "samples space"], spacing: float, most: int
 ) -> Float[np.ndarray, "points space"]:
     """The first positions, in their order, that keep `spacing` [m] from all chosen before; at most `most` of them."""
-    chosen = np.empty((most, positions.shape[1]))
-    count = 0
-    for position in positions:
-        if count == most:
-            break
-        if np.all(np.sum((chosen[:count] - position) ** 2, axis=1) >= spacing**2):
-            chosen[count] = position
-            count += 1
-    return chosen[:count]
+    chosen: list[np.ndarray] = []
+    left = positions
+    while len(left) and len(chosen) < most:
+        chosen.append(left[0])
+        left = left[np.sum((left - left[0]) ** 2, axis=1) >= max(spacing, 1e-12) ** 2]
+    return np.array(chosen)
 
 
 def fixed_targets(

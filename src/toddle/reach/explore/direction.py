@@ -102,9 +102,7 @@ class DirectionSampling(Explorer):
         walk = jax.random.normal(for_walk, (count, joints, space + 1))
         direction = jax.random.normal(for_direction, (count, space))
         direction = direction / jnp.linalg.norm(direction, axis=-1, keepdims=True)
-        return WalkNoise(
-            walk[:, :, :space], walk[:, :, space], direction, jax.random.uniform(for_chance, (count,))
-        )
+        return WalkNoise(walk[:, :, :space], walk[:, :, space], direction, jax.random.uniform(for_chance, (count,)))
 
     def propose(self, state: Walk, noise: WalkNoise, predict: Predict, home: Home) -> tuple[Walk, Proposal]:
         """The next goal of the line (equation 4.1), with g(x*) + E(x*) (4.5); or the next movement on the way home."""
@@ -116,9 +114,7 @@ class DirectionSampling(Explorer):
         reaching = predict(goal) + perturbation / self.box.joint_span
         most = self.home_step / self.box.joint_span
         returning = state.q + jnp.clip(home.q - state.q, -most, most)
-        state = state._replace(
-            goal=goal, step=step, ended=jnp.array(False), goes_home=noise.chance < self.p_home
-        )
+        state = state._replace(goal=goal, step=step, ended=jnp.array(False), goes_home=noise.chance < self.p_home)
         q = jnp.where(state.homing, returning, jnp.clip(reaching, 0.0, 1.0))
         return state, Proposal(q, jnp.where(state.homing, home.x, goal))
 
@@ -172,6 +168,4 @@ def direction_sampling(
         stall: a line ends where the tip makes less than this fraction of the step.
     """
     as_array = lambda value: jnp.float32(value)  # noqa: E731
-    return DirectionSampling(
-        box, *(as_array(value) for value in (step, sigma, 0.1 * sigma, p_home, home_step, stall))
-    )
+    return DirectionSampling(box, *(as_array(value) for value in (step, sigma, 0.1 * sigma, p_home, home_step, stall)))

@@ -66,9 +66,7 @@ class GoalAndMotorBabbling(Explorer):
             drawn = jax.random.uniform(key, (count, sum(sizes)), minval=-1.0, maxval=1.0)
         return LineNoise(drawn[:, : sizes[0]], drawn[:, sizes[0] :])
 
-    def propose(
-        self, state: LineState, noise: LineNoise, predict: Predict, home: Home
-    ) -> tuple[LineState, Proposal]:
+    def propose(self, state: LineState, noise: LineNoise, predict: Predict, home: Home) -> tuple[LineState, Proposal]:
         """P* = P + E, M** = I(P*) + E (equations 4.7, 4.8), motors kept within their limits."""
         goal_step = jnp.where(state.ended, self.perturbation * noise.goal, state.goal_step)
         motor_step = jnp.where(state.ended, self.perturbation * noise.motor, state.motor_step)

@@ -29,17 +29,17 @@ _MOST = 4096
 
 
 class LocalLinearState(NamedTuple):
-    """The prototypes and their linear pieces; rows at and after `count` are not placed yet.
+    """The prototypes and their linear pieces; rows at and after `used` are not placed yet.
 
     Attributes:
         prototypes: p_k in the unit box.
         pieces: W: for each prototype the rows of M_k transposed, then o_k.
-        count: how many prototypes there are.
+        used: how many prototypes there are.
     """
 
     prototypes: Float[Array, "capacity space"]
     pieces: Float[Array, "capacity features joints"]
-    count: Int[Array, ""]
+    used: Int[Array, ""]
 
 
 class LocalLinearMap(Learner):
@@ -57,9 +57,7 @@ class LocalLinearMap(Learner):
     capacity: int = eqx.field(static=True, default=512)
     neighbours: int = eqx.field(static=True, default=16)
 
-    def init(
-        self, key: jax.Array, home_x: Float[Array, " space"], home_q: Float[Array, " joints"]
-    ) -> LocalLinearState:
+    def init(self, key: jax.Array, home_x: Float[Array, " space"], home_q: Float[Array, " joints"]) -> LocalLinearState:
         """One piece that answers home everywhere (the key is not needed: nothing is random)."""
         del key
         space = len(home_x)
@@ -102,13 +100,13 @@ class LocalLinearMap(Learner):
     def _grow(self, state: LocalLinearState, x: Float[Array, " space"]) -> LocalLinearState:
         """A new prototype at x if all others are at least d away: o = g(x), M = d dg/dx."""
         distance = jnp.min(jnp.sum((x - state.prototypes) ** 2, axis=-1))
-        grows = (distance >= self.radius**2) & (state.count < self.capacity)
-        row = jnp.minimum(state.count, self.capacity - 1)
+        grows = (distance >= self.radius**2) & (state.used < self.capacity)
+        row = jnp.minimum(state.used, self.capacity - 1)
         # Only one row passes through the condition, so that the tables are never copied.
         piece = jax.lax.cond(grows, lambda: self._tangent(state, x), lambda: state.pieces[row])
         place = jnp.where(grows, x, state.prototypes[row])
         return LocalLinearState(
-            state.prototypes.at[row].set(place), state.pieces.at[row].set(piece), state.count + grows
+            state.prototypes.at[row].set(place), state.pieces.at[row].set(piece), state.used + grows
         )
 
     def _tangent(self, state: LocalLinearState, x: Float[Array, " space"]) -> Float[Array, "features joints"]:

@@ -1,0 +1,357 @@
+"""``toddle reach``: an arm learns to reach, goes on learning, or is asked to reach."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from toddle.cli.arguments import parse
+from toddle.cli.options import POSITIONAL
+from toddle.failures import BadInput
+
+if TYPE_CHECKING:
+    from toddle.reach.session import Cycle, Session
+    from toddle.reach.skill import Skill
+    from toddle.robots.body import Body, Plant
+    from toddle.robots.catalogue import Choice
+
+_SAVE_SECONDS = 20.0
+_LIVE_SAMPLES = 5_000
+_LENGTH = re.compile(r"(\d+(?:\.\d+)?)(mm|cm|m)")
+_METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+
+
+@dataclass(frozen=True)
+class Reach:
+    """An arm learns its own inverse kinematics from nothing but its movements.
+
+    toddle reach ROBOT learns, and leaves a folder with the skill, its figures and pictures. toddle reach --skill
+    FOLDER --target X Y Z answers with joint angles. toddle reach --resume FOLDER goes on learning.
+
+    Attributes:
+        robot: a name (nicu, suralp, icub_arm, planar:7, planar3, scara, bha), or the path of a URDF or MJCF file.
+        method: how it explores.
+        learner: what learns from it: perceptron or local-linear; the method's own unless given.
+        samples: movements to learn from; 300000 unless given, 5000 in physics.
+        seed: of all randomness.
+        hidden: units of each hidden layer of the perceptron; 0 for none.
+        learning_rate: step of the learner.
+        perturbation: size of exploration.
+        test_points: size of the fixed test set.
+        test_spacing: least distance between its points [m].
+        per_cycle: movements between two tests.
+        tip: the link whose position is learned.
+        base: the link in whose frame it is told.
+        joints: the joints that move; the others are held.
+        plant: what moves: the kinematics, or the arm in physics with servos, gravity and sensor noise.
+        noise: standard deviation of the seen tip on each axis, in physics, such as 1mm.
+        out: the folder to leave; runs/ROBOT unless given.
+        json: print one JSON object with the figures, and nothing else.
+        resume: a folder to go on in.
+        skill: a folder to answer from.
+        target: where the tip should go [m].
+        looks: how often the answer may be corrected by looking; 0 for open loop.
+        tolerance: error up to which a target counts as reached [m].
+    """
+
+    robot: Annotated[str | None, POSITIONAL] = None
+    method: str | None = None
+    learner: str | None = None
+    samples: int | None = None
+    seed: int | None = None
+    hidden: tuple[int, ...] | None = None
+    learning_rate: float | None = None
+    perturbation: float | None = None
+    test_points: int | None = None
+    test_spacing: float | None = None
+    per_cycle: int | None = None
+    tip: str | None = None
+    base: str | None = None
+    joints: tuple[str, ...] | None = None
+    plant: Literal["kinematics", "physics"] = "kinematics"
+    noise: str | None = None
+    out: Path | None = None
+    json: bool = False
+    resume: Path | None = None
+    skill: Path | None = None
+    target: tuple[float, ...] | None = None
+    looks: int = 3
+    tolerance: float | None = None
+
+
+_OF_A_RUN = (
+    "method", "learner", "samples", "seed", "hidden", "learning_rate", "perturbation", "test_points",
+    "test_spacing", "per_cycle",
+)  # fmt: skip
+
+
+def main(argv: Sequence[str]) -> int:
+    """Learn, resume, or answer, and return the exit code."""
+    asked = parse(Reach, argv, prog="toddle reach")
+    _check_mode(asked)
+    if asked.skill is not None:
+        return _answer(asked, asked.skill)
+    if asked.resume is not None:
+        return _resume(asked, asked.resume)
+    return _learn(asked)
+
+
+def _check_mode(asked: Reach) -> None:
+    """Refuse options that contradict each other before anything heavy is imported."""
+    modes = [name for name in ("robot", "skill", "resume") if getattr(asked, name) is not None]
+    if not modes:
+        raise BadInput(
+            "no robot is named",
+            where="toddle reach",
+            remedy="name one, such as nicu, or the path of a URDF or MJCF file",
+        )
+    if len(modes) > 1:
+        raise BadInput(f"{' and '.join(modes)} exclude each other", where="toddle reach", remedy="give one")
+    if (asked.target is None) != (asked.skill is None):
+        missing, given = ("--target", "--skill") if asked.target is None else ("--skill", "--target")
+        raise BadInput(f"{missing} is missing", where=given, remedy="give --skill FOLDER --target X Y Z")
+    fixed = [name for name in _OF_A_RUN if getattr(asked, name) is not None]
+    extra = [name for name in fixed if asked.skill is not None or (asked.resume is not None and name != "samples")]
+    if extra:
+        flag = "--" + extra[0].replace("_", "-")
+        raise BadInput("it was settled when learning began", where=flag, remedy="leave it out")
+    if asked.noise is not None and asked.plant != "physics":
+        raise BadInput("only physics has sensor noise", where="--noise", remedy="add --plant physics")
+    if asked.looks < 0 or asked.looks > 1000:
+        raise BadInput(f"{asked.looks} is out of range", where="--looks", remedy="give 0 to 1000")
+
+
+def _learn(asked: Reach) -> int:
+    from toddle.reach.config import ReachConfig
+    from toddle.reach.methods import method_named
+    from toddle.robots.catalogue import Choice
+
+    given = {name: getattr(asked, name) for name in _OF_A_RUN if getattr(asked, name) is not None}
+    if asked.plant == "physics":
+        given.setdefault("samples", _LIVE_SAMPLES)
+        given.setdefault("per_cycle", 500)
+    if given.get("hidden") == (0,):
+        given["hidden"] = ()
+    config = ReachConfig(**given)
+    method_named(config.method)
+    source = Choice(asked.robot or "", asked.tip, asked.base, asked.joints)
+    how = {"plant": asked.plant, "noise": _metres(asked.noise)}
+    session = _open(source, config, how)
+    folder = _new_folder(asked.out, source.spec)
+    from toddle.reach.session import start
+
+    return _run(asked, session, start(session), source, how, folder)
+
+
+def _resume(asked: Reach, folder: Path) -> int:
+    from toddle.outside.skills import choice_from, read_run, resume
+
+    config, facts, tensors = read_run(folder)
+    if asked.samples is not None:
+        config = replace(config, samples=asked.samples)
+    source, how = choice_from(facts["choice"]), facts["how"]
+    session = _open(source, config, how)
+    cycle = resume(session, tensors, str(folder))
+    if cycle.samples >= config.samples:
+        raise BadInput(
+            f"it has learned from all its {cycle.samples} movements",
+            where=str(folder),
+            remedy=f"ask for more with --samples, such as {2 * cycle.samples}",
+        )
+    return _run(asked, session, cycle, source, how, folder)
+
+
+def _open(source: Choice, config: Any, how: dict[str, Any]) -> Session:
+    """The session of a robot, in kinematics or in physics."""
+    from toddle.reach.api import hidden_of
+    from toddle.reach.session import open_session
+    from toddle.robots.catalogue import load_choice
+
+    body = load_choice(source)
+    return open_session(_mover(body, how, config.seed), config, hidden=hidden_of(source.spec), survey=body)
+
+
+def _mover(body: Body, how: dict[str, Any], seed: int) -> Body | Plant:
+    if how["plant"] != "physics":
+        return body
+    from toddle.outside.simulation import PhysicsOptions, PhysicsPlant
+    from toddle.robots.chain import Chain
+
+    if not isinstance(body, Chain):
+        raise BadInput("a soft arm has no physics here", where="--plant", remedy="leave --plant out")
+    noise = {} if how["noise"] is None else {"noise": how["noise"]}
+    return PhysicsPlant(body, PhysicsOptions(seed=seed, **noise))
+
+
+def _run(asked: Reach, session: Session, cycle: Cycle, source: Choice, how: dict[str, Any], folder: Path) -> int:
+    """Learn to the end or to Ctrl-C, save, evaluate, show."""
+    from toddle.outside.skills import save, save_run
+    from toddle.outside.terminal import Reporter, stoppable
+    from toddle.reach.api import skill_of
+    from toddle.reach.session import cycles
+
+    facts = {"choice": asdict(source), "how": how}
+    first, began = cycle.samples, time.perf_counter()
+    saved = began
+    with Reporter(f"{session.body.name} learns", session.config.samples) as reporter, stoppable() as stop:
+        for latest in cycles(session, cycle):
+            cycle = latest
+            scores = cycle.history[-1]
+            reporter.tell(cycle.samples, f"error {1000 * float(scores.fixed_error):.1f} mm")
+            if time.perf_counter() - saved > _SAVE_SECONDS:
+                save_run(folder, session, cycle, facts)
+                saved = time.perf_counter()
+            if stop.asked:
+                break
+    seconds = time.perf_counter() - began
+    save_run(folder, session, cycle, facts)
+    skill = skill_of(session, cycle, source, seconds=seconds * cycle.samples / max(cycle.samples - first, 1))
+    save(skill, folder)
+    _leave(folder, session, cycle, skill)
+    _tell_figures(asked, skill, folder)
+    if cycle.samples < session.config.samples:
+        print(f"toddle: stopped; go on with: toddle reach --resume {folder}", file=sys.stderr)
+        return 130
+    return 0
+
+
+def _leave(folder: Path, session: Session, cycle: Cycle, skill: Skill) -> None:
+    """The rest of the run's folder: configuration, figures, the course of learning, pictures."""
+    import numpy as np
+
+    from toddle.outside import pictures
+    from toddle.outside.files import write_json
+    from toddle.outside.versions import versions
+    from toddle.robots.catalogue import record
+
+    write_json(
+        folder / "config.json",
+        {"source": asdict(skill.source), **asdict(skill.config), "versions": versions()},
+    )
+    write_json(folder / "figures.json", skill.figures)
+    course = {name: [float(getattr(s, name)) for s in cycle.history] for name in cycle.history[0]._fields}
+    write_json(folder / "course.json", course)
+    known = record(skill.source.spec)
+    published = dict(known.published) if known and skill.config.method == "goal-and-motor-babbling" else {}
+    title = f"{session.body.name}, {skill.config.method}"
+    pictures.error_over_samples(
+        folder / "error.png",
+        [int(n) for n in course["samples"]],
+        [1000 * e for e in course["fixed_error"]],
+        [1000 * e for e in course["seen_error"]],
+        title=f"{title}: error over movements",
+        published=published,
+    )
+    base = np.zeros(skill.seen.shape[1])
+    pictures.explored_space(folder / "explored.png", skill.seen, base, title=f"{title}: explored space")
+    pictures.targets_by_error(folder / "targets.png", skill.targets, skill.errors, title=f"{title}: fixed test set")
+
+
+def _tell_figures(asked: Reach, skill: Skill, folder: Path) -> None:
+    """The figures on standard output: one JSON object, or a table beside the document's."""
+    from toddle.outside.files import finite
+    from toddle.outside.terminal import print_table
+    from toddle.robots.catalogue import record
+
+    if asked.json:
+        print(json.dumps(finite({**skill.figures, "folder": str(folder)})))
+        return
+    known = record(skill.source.spec)
+    published = known.published if known and skill.config.method == "goal-and-motor-babbling" else {}
+    rows = [
+        [name.replace("_", " "), _figure(value), _figure(published[name]) if name in published else ""]
+        for name, value in skill.figures.items()
+    ]
+    print_table(
+        f"{skill.figures['robot']} after {skill.figures['samples']} movements",
+        ("", "this run", "document"),
+        rows,
+    )
+    print(f"figures, pictures and the skill: {folder}")
+    middle = " ".join(f"{value:.3f}" for value in skill.targets[len(skill.targets) // 2])
+    print(f"ask it: toddle reach --skill {folder} --target {middle}")
+
+
+def _figure(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.2f}"
+    return str(value)
+
+
+def _answer(asked: Reach, folder: Path) -> int:
+    """Answer a target from a saved skill."""
+    from toddle.outside.skills import load_skill
+    from toddle.reach.api import check_same_robot
+    from toddle.reach.observe import observer
+    from toddle.reach.skill import solve
+    from toddle.robots.catalogue import load_choice
+    from toddle.signals import Verdict
+
+    skill = load_skill(folder)
+    observe = None
+    if asked.looks > 0:
+        body = load_choice(skill.source)
+        check_same_robot(skill, body)
+        how = {"plant": asked.plant, "noise": _metres(asked.noise)}
+        observe = observer(_mover(body, how, skill.config.seed))
+    answer = solve(skill, asked.target or (), observe=observe, looks=max(asked.looks, 1), tolerance=asked.tolerance)
+    if asked.json:
+        print(
+            json.dumps(
+                {
+                    "robot": skill.source.spec,
+                    "target": list(asked.target or ()),
+                    "joints": dict(zip(skill.joints, map(float, answer.q), strict=True)),
+                    "expected_error_mm": 1000 * answer.expected_error,
+                    "looks": answer.steps,
+                    "verdict": str(answer.verdict),
+                    "reason": answer.reason,
+                }
+            )
+        )
+    elif answer.verdict is not Verdict.OUT_OF_REACH:
+        width = max(map(len, skill.joints))
+        for name, value in zip(skill.joints, answer.q, strict=True):
+            print(f"{name:<{width}}  {value:9.5f}  ({math.degrees(value):7.2f} deg)")
+        print(f"{answer.verdict}: {answer.reason}")
+    if answer.verdict is Verdict.OUT_OF_REACH:
+        raise BadInput(f"out of reach, {answer.reason}", where="--target", remedy="aim at that, or closer")
+    return 0 if answer.verdict is Verdict.REACHED else 1
+
+
+def _new_folder(out: Path | None, spec: str) -> Path:
+    """The folder that a new run may write into.
+
+    Raises:
+        BadInput: it holds another run, or can't be made.
+    """
+    from toddle.outside.files import make_folder
+
+    if out is not None:
+        if (out / "run.json").exists() or (out / "skill.json").exists():
+            raise BadInput(
+                "it holds a run already", where=str(out), remedy=f"go on with --resume {out}, or name another"
+            )
+        return make_folder(out)
+    name = re.sub(r"[^\w.-]+", "-", Path(spec).stem if Path(spec).suffix else spec).strip("-") or "robot"
+    number = 1
+    while (folder := Path("runs") / (name if number == 1 else f"{name}-{number}")).exists():
+        number += 1
+    return make_folder(folder)
+
+
+def _metres(length: str | None) -> float | None:
+    """A length with its unit, such as 1mm, in metres."""
+    if length is None:
+        return None
+    match = _LENGTH.fullmatch(length)
+    if match is None:
+        raise BadInput(f"{length!r} is not a length", where="--noise", remedy="give one with its unit, such as 1mm")
+    return float(match[1]) * _METRES[match[2]]

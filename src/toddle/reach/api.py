@@ -1,0 +1,160 @@
+"""The six lines: learn, solve, evaluate. What the command line does is written with these."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypedDict, Unpack
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from toddle.failures import BadInput
+from toddle.reach.config import ReachConfig
+from toddle.reach.evaluate.figures import error_figures, errors_of, query_figures, reach_figures
+from toddle.reach.evaluate.seen import draw_seen, kept
+from toddle.reach.observe import observer
+from toddle.reach.session import Cycle, Session, cycles, open_session, start
+from toddle.reach.skill import Skill
+from toddle.reach.solve.correction import correct
+from toddle.reach.solve.query import query_of
+from toddle.robots.body import Body, Plant
+from toddle.robots.catalogue import Choice, load, load_choice, record
+
+LOOKS = 3
+
+
+class Options(TypedDict, total=False):
+    """The keyword arguments of `learn`: the fields of `ReachConfig`."""
+
+    method: str
+    learner: str | None
+    samples: int
+    seed: int
+    hidden: tuple[int, ...] | None
+    learning_rate: float | None
+    perturbation: float | None
+    per_cycle: int
+    test_points: int
+    test_spacing: float | None
+
+
+def learn(
+    robot: Body | Plant | str,
+    *,
+    on_cycle: Callable[[Cycle], None] | None = None,
+    **options: Unpack[Options],
+) -> Skill:
+    """Let an arm learn its inverse kinematics from its own movements.
+
+    Args:
+        robot: a body, a plant that moves one movement at a time, or what `toddle.load` takes.
+        on_cycle: called after each testing cycle with the run's state.
+        **options: the fields of `ReachConfig`: method, samples, seed, hidden, ...
+
+    Raises:
+        BadInput: an option that there isn't, is out of range, or doesn't fit the robot.
+    """
+    unknown = set(options) - set(ReachConfig.__dataclass_fields__)
+    if unknown:
+        raise BadInput(f"no option named {sorted(unknown)[0]!r}", where="learn")
+    body = load(robot) if isinstance(robot, str) else robot
+    session = open_session(body, ReachConfig(**options), hidden=hidden_of(body.name))
+    began = time.perf_counter()
+    cycle = start(session)
+    for latest in cycles(session, cycle):
+        cycle = latest
+        if on_cycle is not None:
+            on_cycle(cycle)
+    seconds = time.perf_counter() - began
+    source = Choice(robot if isinstance(robot, str) else body.name)
+    return skill_of(session, cycle, source, seconds=seconds)
+
+
+def skill_of(session: Session, cycle: Cycle, source: Choice, *, seconds: float = 0.0) -> Skill:
+    """The skill that a run has come to, evaluated.
+
+    Args:
+        session: the run.
+        cycle: how far it came.
+        source: what `toddle.load` makes the body from.
+        seconds: how long learning took, for the figures [s].
+    """
+    progress, setting = cycle.progress, session.setting
+    seen = np.asarray(setting.box.x_from_unit(jnp.asarray(kept(progress.seen))), float)
+    key = jax.random.fold_in(progress.key, 1)
+    seen_targets = np.asarray(setting.box.x_from_unit(draw_seen(progress.seen, key, len(session.targets))), float)
+    predict = lambda targets: session.predict(progress, targets)  # noqa: E731
+    figures, errors, _ = reach_figures(predict, session.observe, session.targets, seen_targets, LOOKS)
+    hidden = getattr(setting.learner, "hidden", ())
+    skill = Skill(
+        source, session.body.joints, np.asarray(session.body.home, float), session.config, hidden,
+        setting.box, setting.learner, progress.learner, seen, session.targets, errors, {},
+    )  # fmt: skip
+    figures = {
+        "robot": session.body.name,
+        "method": session.config.method,
+        "samples": cycle.samples,
+        "seed": session.config.seed,
+        **figures,
+        "coverage_percent": 100 * float(cycle.history[-1].coverage) if cycle.history else 0.0,
+        "test_points": len(session.targets),
+        "test_spacing_mm": 1000 * session.spacing,
+        "samples_per_second": cycle.samples / seconds if seconds else 0.0,
+        **query_figures(query_of(skill), skill.predict, skill.targets),
+    }
+    return replace(skill, figures=figures)
+
+
+def evaluate(
+    skill: Skill, robot: Body | Plant | str | None = None, *, points: int = 1000, seed: int = 1
+) -> dict[str, float]:
+    """How well a skill reaches, on fresh targets that it has never seen.
+
+    Args:
+        skill: what was learned.
+        robot: the body or plant that moves; None: the one that the skill was learned on, loaded again.
+        points: how many targets, the tip's positions in postures drawn uniformly.
+        seed: of the targets.
+
+    Returns:
+        Open-loop and closed-loop errors [mm]: mean, median, 99th percentile and maximum of each.
+
+    Raises:
+        BadInput: the robot isn't the one of the skill: other joints, or other limits.
+    """
+    if robot is None or isinstance(robot, str):
+        robot = load_choice(replace(skill.source, spec=robot or skill.source.spec))
+    check_same_robot(skill, robot)
+    observe = observer(robot)
+    fraction = np.random.default_rng(seed).random((points, len(skill.joints)))
+    targets = observe(np.asarray(skill.box.q_from_unit(jnp.asarray(fraction, jnp.float32))))
+    closed = correct(skill.predict, observe, targets, LOOKS)[1][-1]
+    return {
+        **error_figures("open_loop_error", errors_of(skill.predict, observe, targets)),
+        **error_figures("closed_loop_error", closed),
+    }
+
+
+def check_same_robot(skill: Skill, robot: Body | Plant) -> None:
+    """Refuse a robot with other joints or limits than the skill's.
+
+    Raises:
+        BadInput: it is another robot.
+    """
+    low = np.asarray(skill.box.joint_lower)
+    same = robot.joints == skill.joints and np.allclose(low, np.asarray(robot.lower), atol=1e-5)
+    if not (same and np.allclose(low + np.asarray(skill.box.joint_span), np.asarray(robot.upper), atol=1e-5)):
+        raise BadInput(
+            f"its joints or their limits aren't those of the skill ({', '.join(skill.joints)})",
+            where=robot.name,
+            remedy="take the robot that the skill was learned on, or learn again",
+        )
+
+
+def hidden_of(spec: str) -> tuple[int, ...]:
+    """The hidden layers that suit a robot of the catalogue; a middling size for any other."""
+    known = record(spec)
+    return known.hidden if known is not None else (40, 40)

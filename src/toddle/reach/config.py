@@ -1,0 +1,70 @@
+"""What defines a run of `toddle reach`: frozen, checked once, written into the run's folder."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from toddle.failures import BadInput
+
+MOST_SAMPLES = 100_000_000
+
+
+@dataclass(frozen=True)
+class ReachConfig:
+    """One run of the learning loop. None means "what suits the method and the robot".
+
+    Attributes:
+        method: how it explores (see `toddle.reach.methods.METHODS`).
+        learner: what learns from it: perceptron or local-linear.
+        samples: how many movements to learn from.
+        seed: of all randomness.
+        hidden: hidden layers of the perceptron; () is the single-layer perceptron.
+        learning_rate: step of the learner.
+        perturbation: size of exploration: of each component in the unit box for goal-and-motor babbling, of the
+            exploratory noise [rad] for goal babbling, of a step as a fraction of the range for continuous babbling.
+        per_cycle: movements between two tests.
+        test_points: size of the fixed test set.
+        test_spacing: least distance between its points [m].
+    """
+
+    method: str = "goal-and-motor-babbling"
+    learner: str | None = None
+    samples: int = 300_000
+    seed: int = 0
+    hidden: tuple[int, ...] | None = None
+    learning_rate: float | None = None
+    perturbation: float | None = None
+    per_cycle: int = 2000
+    test_points: int = 110
+    test_spacing: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what can't be run.
+
+        Raises:
+            BadInput: a number out of its range.
+        """
+        _within("samples", self.samples, 1, MOST_SAMPLES)
+        _within("seed", self.seed, 0, 2**32 - 1)
+        _within("per-cycle", self.per_cycle, 1, 1_000_000)
+        _within("test-points", self.test_points, 1, 10_000)
+        for size in self.hidden or ():
+            _within("hidden", size, 1, 4096)
+        if len(self.hidden or ()) > 8:
+            raise BadInput(f"{len(self.hidden or ())} layers", where="--hidden", remedy="give 8 or fewer")
+        for name in ("learning_rate", "perturbation", "test_spacing"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and 0 < value <= 100):
+                raise BadInput(
+                    f"{value} is out of range", where=_flag(name), remedy="give a number above 0, at most 100"
+                )
+
+
+def _within(name: str, value: int, least: int, most: int) -> None:
+    if not least <= value <= most:
+        raise BadInput(f"{value} is out of range", where=_flag(name), remedy=f"give {least} to {most}")
+
+
+def _flag(name: str) -> str:
+    return "--" + name.replace("_", "-")

@@ -1,0 +1,78 @@
+"""The figures of a run: open-loop and closed-loop errors, apart; speeds; by the names that the JSON output uses."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from jaxtyping import Float
+
+from toddle.reach.solve.correction import correct
+
+Map = Callable[[np.ndarray], np.ndarray]
+
+
+def errors_of(predict: Map, observe: Map, targets: Float[np.ndarray, "points space"]) -> Float[np.ndarray, " points"]:
+    """Open-loop errors: distance between each target and where its one-shot answer brings the tip [m]."""
+    return np.linalg.norm(observe(predict(targets)) - targets, axis=1)
+
+
+def error_figures(name: str, errors: Float[np.ndarray, " points"]) -> dict[str, float]:
+    """Mean, median, 99th percentile and maximum of errors [m], in millimetres."""
+    millimetres = 1000 * errors
+    return {
+        f"{name}_mean_mm": float(millimetres.mean()),
+        f"{name}_median_mm": float(np.median(millimetres)),
+        f"{name}_p99_mm": float(np.percentile(millimetres, 99)),
+        f"{name}_max_mm": float(millimetres.max()),
+    }
+
+
+def reach_figures(
+    predict: Map,
+    observe: Map,
+    fixed: Float[np.ndarray, "points space"],
+    seen: Float[np.ndarray, "seen space"],
+    looks: int,
+) -> tuple[dict[str, float], Float[np.ndarray, " points"], Float[np.ndarray, " seen"]]:
+    """How well something reaches.
+
+    Args:
+        predict: targets [m] to joint values.
+        observe: joint values to observed tip positions [m].
+        fixed: the fixed test set [m].
+        seen: test targets that were visited while learning [m].
+        looks: corrections by observation that the closed loop may make.
+
+    Returns:
+        The figures [mm], and the open-loop errors on both sets, point by point [m].
+    """
+    fixed_errors = errors_of(predict, observe, fixed)
+    seen_errors = errors_of(predict, observe, seen)
+    closed = correct(predict, observe, fixed, looks)[1][-1]
+    figures = {
+        **error_figures("fixed_error", fixed_errors),
+        **error_figures("seen_error", seen_errors),
+        **error_figures("closed_loop_error", closed),
+    }
+    return figures, fixed_errors, seen_errors
+
+
+def query_figures(one: Map, many: Map, targets: Float[np.ndarray, "points space"]) -> Mapping[str, float]:
+    """How long a query takes [us]: one target at a time, and each of 4,096 at once; medians, warm."""
+    batch = np.resize(targets, (4096, targets.shape[1])).astype(np.float32)
+    return {
+        "query_us_single": 1e6 * _median_seconds(lambda: one(batch[0]), 200),
+        "query_us_batch4096": 1e6 * _median_seconds(lambda: many(batch), 11) / 4096,
+    }
+
+
+def _median_seconds(call: Callable[[], object], repeats: int) -> float:
+    call()
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        call()
+        times.append(time.perf_counter() - start)
+    return float(np.median(times))

@@ -1,0 +1,126 @@
+"""The methods by name: which explorer, which learner, which scales. The only place to edit to add one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+
+from toddle.failures import BadInput, unknown_name
+from toddle.reach.config import ReachConfig
+from toddle.reach.explore.explorer import Explorer
+from toddle.reach.explore.goal_and_motor import GoalAndMotorBabbling
+from toddle.reach.explore.motor import ContinuousMotorBabbling, MotorBabbling
+from toddle.reach.learn.learner import Learner
+from toddle.reach.learn.perceptron import Perceptron
+from toddle.reach.unit_box import UnitBox
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way to explore, and what it learns with unless told otherwise.
+
+    Attributes:
+        name: on the command line.
+        about: one line for the listing.
+        source: document and section.
+        explorer: makes the explorer for a configuration and a body's unit box.
+        learner: the learner's name.
+    """
+
+    name: str
+    about: str
+    source: str
+    explorer: Callable[[ReachConfig, UnitBox], Explorer]
+    learner: str
+
+
+def _goal_and_motor(config: ReachConfig, box: UnitBox) -> Explorer:
+    return GoalAndMotorBabbling(jnp.float32(_or(config.perturbation, 0.233)))
+
+
+def _motor(config: ReachConfig, box: UnitBox) -> Explorer:
+    return MotorBabbling()
+
+
+def _continuous_motor(config: ReachConfig, box: UnitBox) -> Explorer:
+    return ContinuousMotorBabbling(jnp.float32(_or(config.perturbation, 0.1)))
+
+
+def _perceptron(config: ReachConfig, box: UnitBox, hidden: tuple[int, ...]) -> Learner:
+    return Perceptron(jnp.float32(_or(config.learning_rate, 0.717)), hidden if config.hidden is None else config.hidden)
+
+
+_METHODS = (
+    Method(
+        "goal-and-motor-babbling",
+        "lines in goal space, each with a perturbation of goal and motors",
+        "Mahboob 2015, algorithm 1",
+        _goal_and_motor,
+        "perceptron",
+    ),
+    Method(
+        "motor-babbling",
+        "joint values at random",
+        "Moulin-Frier 2013, random motor",
+        _motor,
+        "perceptron",
+    ),
+    Method(
+        "continuous-motor-babbling",
+        "a random walk through joint space",
+        "Thuruthel 2016, section 2",
+        _continuous_motor,
+        "perceptron",
+    ),
+)
+
+METHODS: Mapping[str, Method] = {method.name: method for method in _METHODS}
+LEARNERS: Mapping[str, Callable[[ReachConfig, UnitBox, tuple[int, ...]], Learner]] = {
+    "perceptron": _perceptron,
+}
+
+
+def method_named(name: str) -> Method:
+    """The method of this name.
+
+    Raises:
+        BadInput: there is none; the nearest are named.
+    """
+    if name not in METHODS:
+        raise unknown_name("method", name, METHODS, where="--method")
+    return METHODS[name]
+
+
+def make_explorer(config: ReachConfig, box: UnitBox) -> Explorer:
+    """The explorer that a configuration asks for, in a body's unit box."""
+    return method_named(config.method).explorer(config, box)
+
+
+def make_learner(config: ReachConfig, box: UnitBox, hidden: tuple[int, ...]) -> Learner:
+    """The learner that a configuration asks for.
+
+    Args:
+        config: the run's configuration.
+        box: the body's unit box.
+        hidden: the robot's own choice of hidden layers, for where the configuration makes none.
+
+    Raises:
+        BadInput: no such learner, or an option that it hasn't.
+    """
+    name = config.learner or method_named(config.method).learner
+    if name not in LEARNERS:
+        raise unknown_name("learner", name, LEARNERS, where="--learner")
+    if name != "perceptron" and config.hidden is not None:
+        raise BadInput(f"{name} has no hidden layers", where="--hidden", remedy="add --learner perceptron")
+    return LEARNERS[name](config, box, hidden)
+
+
+def _or(value: float | None, default: float) -> float:
+    return default if value is None else value
+
+
+def needs_equal_scales(config: ReachConfig) -> bool:
+    """Whether the learner measures distances in space, so that one scale must serve all axes."""
+    return (config.learner or method_named(config.method).learner) == "local-linear"

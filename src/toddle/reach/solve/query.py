@@ -1,0 +1,41 @@
+"""One target at a time, in microseconds: a learned inverse as a plain numpy function.
+
+Dispatching a compiled JAX function costs more than evaluating a small network; numpy has the answer before that. Both
+engines compute with the same arrays, and a test holds them equal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from toddle.reach.learn.perceptron import Perceptron
+from toddle.reach.skill import Skill
+
+Query = Callable[[Float[np.ndarray, " space"]], Float[np.ndarray, " joints"]]
+
+
+def query_of(skill: Skill) -> Query:
+    """The skill's one-shot answer to a single target [m], as joint values within their limits [rad or m]."""
+    if isinstance(skill.learner, Perceptron):
+        return _perceptron_query(skill)
+    return lambda target: skill.predict(target[None])[0]
+
+
+def _perceptron_query(skill: Skill) -> Query:
+    box = skill.box
+    low, span = np.asarray(box.joint_lower, float), np.asarray(box.joint_span, float)
+    state: Any = skill.state
+    *hidden, (last, last_bias) = [(np.asarray(weights, float), np.asarray(bias, float)) for weights, bias in state]
+    scale, shift = 1 / np.asarray(box.space_span, float), np.asarray(box.space_lower, float)
+
+    def answer(target: Float[np.ndarray, " space"]) -> Float[np.ndarray, " joints"]:
+        x = (target - shift) * scale
+        for weights, bias in hidden:
+            x = 1 / (1 + np.exp(-(weights @ x + bias)))
+        return low + span / (1 + np.exp(-(last @ x + last_bias)))
+
+    return answer
