@@ -41,9 +41,7 @@ def _jacobian(body: Body, q: jax.Array) -> tuple[jax.Array, jax.Array]:
     """By jacfwd, and by central differences."""
     h = 1e-6
     steps = h * jnp.eye(q.size, dtype=q.dtype)
-    differences = (jax.vmap(body.forward)(q[None] + steps) - jax.vmap(body.forward)(q[None] - steps)) / (
-        2 * h
-    )
+    differences = (jax.vmap(body.forward)(q[None] + steps) - jax.vmap(body.forward)(q[None] - steps)) / (2 * h)
     return jax.jacfwd(body.forward)(q), differences.T
 
 
@@ -58,9 +56,7 @@ def test_names_limits_and_home_fit_together(body: Body) -> None:
     assert body.lower.shape == body.upper.shape == body.home.shape == (count,)
     assert body.lower.dtype == body.upper.dtype == body.home.dtype == jnp.float32
     assert np.all(np.asarray(body.lower) < np.asarray(body.upper))
-    assert np.all(
-        (np.asarray(body.lower) <= np.asarray(body.home)) & (np.asarray(body.home) <= np.asarray(body.upper))
-    )
+    assert np.all((np.asarray(body.lower) <= np.asarray(body.home)) & (np.asarray(body.home) <= np.asarray(body.upper)))
 
 
 def test_forward_is_finite_and_the_same_alone_and_in_a_batch(body: Body) -> None:
@@ -76,13 +72,9 @@ def test_every_joint_moves_the_tip_or_turns_it(body: Body) -> None:
     """The Jacobian against central differences, in double precision."""
     with jax.enable_x64(True):
         double = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float64), body)
-        by_rule, by_difference = _jacobian(
-            double, jnp.asarray(np.asarray(_some_q(body)[0], dtype=np.float64))
-        )
+        by_rule, by_difference = _jacobian(double, jnp.asarray(np.asarray(_some_q(body)[0], dtype=np.float64)))
     np.testing.assert_allclose(np.asarray(by_rule), np.asarray(by_difference), atol=1e-8)
-    still = [
-        joint for joint, column in zip(body.joints, np.asarray(by_rule).T, strict=True) if not column.any()
-    ]
+    still = [joint for joint, column in zip(body.joints, np.asarray(by_rule).T, strict=True) if not column.any()]
     assert still == (["theta_3"] if body.name == "scara" else [])
 
 
@@ -114,9 +106,7 @@ def test_an_arm_has_room_for_the_documents_test_points(spec: str) -> None:
     middle, half = (lower + upper) / 2, (upper - lower) / 2
     narrow = (middle + (q - middle) * np.float32(0.5)).astype(np.float32)
     assert half.min() > 0
-    assert (
-        _packed(np.asarray(_batch(body, jnp.asarray(narrow))), record.test_spacing) < 0.5 * record.test_points
-    )
+    assert _packed(np.asarray(_batch(body, jnp.asarray(narrow))), record.test_spacing) < 0.5 * record.test_points
 
 
 @pytest.mark.parametrize("file", sorted(MODELS.glob("*.urdf")), ids=lambda path: path.stem)
@@ -158,9 +148,7 @@ def test_a_joint_that_is_not_chosen_stays_at_zero_or_as_near_as_it_can(tmp_path:
 def test_the_root_element_decides_and_not_the_files_name(tmp_path: Path) -> None:
     urdf, mjcf = tmp_path / "arm.xml", tmp_path / "arm.urdf"
     urdf.write_text((MODELS / "suralp.urdf").read_text())
-    mjcf.write_text(
-        '<mujoco><worldbody><body name="a"><joint name="one"/><site name="s"/></body></worldbody></mujoco>'
-    )
+    mjcf.write_text('<mujoco><worldbody><body name="a"><joint name="one"/><site name="s"/></body></worldbody></mujoco>')
     assert robots.load(urdf).joints == robots.load("suralp").joints
     assert robots.load(str(mjcf), tip="s").joints == ("one",)
 
@@ -175,9 +163,7 @@ def test_the_root_element_decides_and_not_the_files_name(tmp_path: Path) -> None
         ("pandaa_description", "did you mean panda_description"),
     ],
 )
-def test_a_wrong_name_is_answered_with_the_nearest(
-    spec: str, says: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_wrong_name_is_answered_with_the_nearest(spec: str, says: str, monkeypatch: pytest.MonkeyPatch) -> None:
     known = {"panda_description": 0, "panda_mj_description": 0, "iiwa14_description": 0}
     monkeypatch.setattr(packages, "descriptions", lambda: known)
     with pytest.raises(BadInput) as caught:
@@ -213,9 +199,7 @@ def test_a_described_robot_is_read_from_where_its_package_put_it(
         return found
 
     _describe_as(monkeypatch, module)
-    assert (
-        robots.load("iiwa").joints == robots.load("iiwa_description").joints == robots.load("suralp").joints
-    )
+    assert robots.load("iiwa").joints == robots.load("iiwa_description").joints == robots.load("suralp").joints
     assert capsys.readouterr().out == ""
 
 
@@ -237,9 +221,7 @@ def test_importing_and_listing_loads_nothing_heavy() -> None:
         "import sys; from toddle import robots; robots.describe(); robots.names(); "
         "print({'jax', 'mujoco', 'numpy', 'icub_models', 'robot_descriptions'} & set(sys.modules))"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
-    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
     assert done.stdout.strip() == "set()"
 
 

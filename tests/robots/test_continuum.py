@@ -88,9 +88,7 @@ def test_derivatives_agree_with_finite_differences(where: str) -> None:
         "at the change of formula": np.array([0.2, 0.2 + 0.75 * 0.1 * np.sqrt(0.5) * 2, 0.2] + [0.2] * 6),
     }[where]
     h = 1e-6
-    steps = [
-        (_published(q + h * e, RADII) - _published(q - h * e, RADII))[:3, 3] / (2 * h) for e in np.eye(9)
-    ]
+    steps = [(_published(q + h * e, RADII) - _published(q - h * e, RADII))[:3, 3] / (2 * h) for e in np.eye(9)]
     with jax.enable_x64(True):
         arm = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float64), bha())
         arm = replace(arm, radii=jnp.array(RADII))

@@ -42,7 +42,7 @@ ARM = """
             <joint name="extend" pos=".2 .1 0" ref=".05"/>
             <joint name="finger" class="sliding" axis="0 1 2"/>
             <geom class="look"/>
-            <site name="grip" pos=".1 0 .05" zaxis="1 1 1"/>
+            <site name="grip" type="capsule" size=".01" fromto=".1 0 .05 .2 .1 .15" material="grey"/>
             <body name="held" pos="0 0 .1"><geom class="look"/></body>
           </body>
         </frame>
@@ -109,9 +109,7 @@ def test_an_included_file_of_the_same_folder_is_read(tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.asarray(chain.before), np.asarray(whole.before))
 
 
-def test_an_equality_with_nothing_holds_a_joint_still(
-    mujoco_pose: Pose, answer: Answer, tmp_path: Path
-) -> None:
+def test_an_equality_with_nothing_holds_a_joint_still(mujoco_pose: Pose, answer: Answer, tmp_path: Path) -> None:
     text = ARM.replace("</equality>", '<joint joint1="pitch" polycoef=".4 0 0 0 0"/></equality>')
     chain = read_mjcf(_arm(tmp_path, text))
     assert chain.joints == ("yaw", "extend")
@@ -130,9 +128,7 @@ def test_a_curved_equality_matters_only_where_it_is_on_the_chain(tmp_path: Path)
 
 def test_an_unlimited_hinge_turns_half_a_turn_either_way(tmp_path: Path) -> None:
     path = tmp_path / "free.xml"
-    path.write_text(
-        '<mujoco><worldbody><body><joint/><body name="b" pos="1 0 0"/></body></worldbody></mujoco>'
-    )
+    path.write_text('<mujoco><worldbody><body><joint/><body name="b" pos="1 0 0"/></body></worldbody></mujoco>')
     chain = read_mjcf(path)
     np.testing.assert_allclose([chain.lower[0], chain.upper[0]], [-np.pi, np.pi], rtol=1e-6)
 

@@ -21,8 +21,8 @@ from toddle.reach.config import ReachConfig
 from toddle.reach.evaluate.seen import cell_of, cells_per_axis
 from toddle.reach.evaluate.targets import fixed_targets
 from toddle.reach.explore.explorer import Home
-from toddle.reach.observe import observer
 from toddle.reach.methods import make_explorer, make_learner, needs_equal_scales
+from toddle.reach.observe import observer
 from toddle.reach.unit_box import around, sample_reachable
 from toddle.robots.body import Body, Plant
 

@@ -71,7 +71,7 @@ class Skill:
         return float(self.errors[near].mean())
 
     def reach(self, target: Float[np.ndarray, " space"]) -> tuple[np.ndarray, float, float]:
-        """The nearest visited position [m], its distance [m], and the distance up to which a target counts as reachable."""
+        """The nearest visited position, its distance, and the distance up to which a target is reachable [m]."""
         squared = np.sum((self.seen - target) ** 2, axis=1)
         nearest = int(np.argmin(squared))
         return self.seen[nearest], float(np.sqrt(squared[nearest])), _GAP * _typical_gap(self.seen)
