@@ -102,9 +102,8 @@ def test_derivatives_agree_with_finite_differences(where: str) -> None:
 @jax.jit
 def _derivatives(arm: Continuum, q: jax.Array) -> tuple[jax.Array, ...]:
     jacobian = jax.jacfwd(arm.forward)
-    two = jnp.stack([q, q])
     _, second = jax.jvp(jacobian, (q,), (jnp.ones(9),))
-    return jacobian(q), jax.jacrev(arm.forward)(q), jax.vmap(jacobian)(two), second
+    return jacobian(q), jax.jacrev(arm.forward)(q), jax.vmap(jacobian)(jnp.stack([q, q])), second
 
 
 def test_the_straight_arms_derivative_is_exact_in_single_precision() -> None:
