@@ -289,19 +289,18 @@ def _answer(asked: Reach, folder: Path) -> int:
     """Answer a target from a saved skill."""
     from toddle.outside.skills import load_skill
     from toddle.reach.api import check_same_robot
-    from toddle.reach.observe import observer
     from toddle.reach.skill import solve
     from toddle.robots.catalogue import load_choice
     from toddle.signals import Verdict
 
     skill = load_skill(folder)
-    observe = None
+    robot = None
     if asked.looks > 0:
         body = load_choice(skill.source)
         check_same_robot(skill, body)
         how = {"plant": asked.plant, "noise": _metres(asked.noise)}
-        observe = observer(_mover(body, how, skill.config.seed))
-    answer = solve(skill, asked.target or (), observe=observe, looks=max(asked.looks, 1), tolerance=asked.tolerance)
+        robot = _mover(body, how, skill.config.seed)
+    answer = solve(skill, asked.target or (), robot=robot, looks=max(asked.looks, 1), tolerance=asked.tolerance)
     if asked.json:
         print(
             json.dumps(

@@ -18,9 +18,10 @@ from jaxtyping import Array, Float
 from toddle.failures import BadInput
 from toddle.reach.config import ReachConfig
 from toddle.reach.learn.learner import Learner
-from toddle.reach.observe import Observe
+from toddle.reach.observe import observer
 from toddle.reach.solve.correction import correct
 from toddle.reach.unit_box import UnitBox
+from toddle.robots.body import Body, Plant
 from toddle.robots.catalogue import Choice
 from toddle.signals import Solution, Verdict
 
@@ -97,7 +98,7 @@ def solve(
     skill: Skill,
     target: Sequence[float] | Float[np.ndarray, " space"],
     *,
-    observe: Observe | None = None,
+    robot: Body | Plant | None = None,
     looks: int = 3,
     tolerance: float | None = None,
 ) -> Solution:
@@ -106,8 +107,9 @@ def solve(
     Args:
         skill: what was learned.
         target: where the tip should go, in the base frame [m].
-        observe: moves to joint values and says where the tip went; None: open loop, one shot.
-        looks: how many times it may be asked.
+        robot: the body or plant that tries the answer, so that it can be corrected by looking where the tip went;
+            None: open loop, one shot.
+        looks: how often it may be corrected.
         tolerance: the error up to which a target counts as reached [m]; None: 5 mm where somebody looks, twice the
             skill's mean held-out error where nobody does.
 
@@ -121,7 +123,7 @@ def solve(
     """
     aim = _checked_target(skill, target)
     if looks < 1:
-        raise BadInput(f"{looks} looks", where="looks", remedy="give at least 1, or observe=None for open loop")
+        raise BadInput(f"{looks} looks", where="looks", remedy="give at least 1, or no robot for open loop")
     if tolerance is not None and not 0 < tolerance < float("inf"):
         raise BadInput(f"{tolerance} is out of range", where="tolerance", remedy="give a distance above 0 [m]")
     nearest, distance, reachable_within = skill.reach(aim)
@@ -130,11 +132,11 @@ def solve(
         where = " ".join(f"{value:.3f}" for value in nearest)
         reason = f"{1000 * distance:.0f} mm from anything it ever reached; the nearest such position is {where}"
         return Solution(q, distance + skill.expected_error(nearest), 0, Verdict.OUT_OF_REACH, reason)
-    if observe is None:
+    if robot is None:
         q = skill.predict(aim[None])[0]
         allowed = 2 * float(skill.errors.mean()) if tolerance is None else tolerance
         return _judged(skill, q, skill.expected_error(aim), 0, allowed)
-    q, errors = correct(skill.predict, observe, aim[None], looks)
+    q, errors = correct(skill.predict, observer(robot), aim[None], looks)
     return _judged(skill, q[0], float(errors[:, 0].min()), looks, 0.005 if tolerance is None else tolerance)
 
 
