@@ -45,6 +45,7 @@ URDF: dict[str, tuple[str | bytes, dict[str, Any], str]] = {
     "not utf-8": (b"<?xml version='1.0' encoding='utf-8'?><robot name='\xff\xfe'/>", {}, "not XML"),
     "odd encoding": (b"<?xml version='1.0' encoding='klingon'?><robot/>", {}, "not XML"),
     "bomb": (BOMB, {}, "entities, which are refused.*DOCTYPE"),
+    "document type": ("<!DOCTYPE robot><robot/>", {}, "document type or entities, which are refused"),
     "foreign entity": (STRANGER, {}, "entities, which are refused"),
     "another root": ("<sdf/>", {}, "<sdf>, neither <robot>.*nor <mujoco>"),
     "xacro": (

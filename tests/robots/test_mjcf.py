@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from toddle import robots
 from toddle.failures import BadInput
+from toddle.robots import mjcf
 from toddle.robots.chain import Chain
 from toddle.robots.mjcf import read_mjcf
 
@@ -146,3 +147,15 @@ def test_nothing_is_printed_and_no_log_is_left(
             assert text != ARM
     assert capfd.readouterr() == ("", "")
     assert [p.name for p in tmp_path.iterdir()] == ["arm.xml"]
+
+
+def test_a_warning_of_mujocos_is_kept_off_the_terminal_and_its_handler_put_back(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    before = mujoco.get_mju_user_warning()
+    with mjcf._silent():  # a NaN is what MuJoCo warns of; a file with one never gets so far
+        mujoco.MjModel.from_xml_string('<mujoco><worldbody><site pos="nan 0 0"/></worldbody></mujoco>')
+    assert capfd.readouterr() == ("", "")
+    assert not list(tmp_path.iterdir())
+    assert mujoco.get_mju_user_warning() is before

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
@@ -43,9 +44,7 @@ def _unfused(path: Path) -> mujoco.MjModel:
     ("spec", "base", "tip"),
     [("nicu", "torso", "tip"), ("suralp", "torso", "tip"), ("icub_arm", "chest", "r_hand_dh_frame")],
 )
-def test_a_known_arm_agrees_with_mujoco(
-    mujoco_pose: Pose, answer: Answer, spec: str, base: str, tip: str
-) -> None:
+def test_a_known_arm_agrees_with_mujoco(mujoco_pose: Pose, answer: Answer, spec: str, base: str, tip: str) -> None:
     chain = robots.load(spec)
     assert isinstance(chain, Chain)
     if spec == "icub_arm":
@@ -56,9 +55,7 @@ def test_a_known_arm_agrees_with_mujoco(
         model = _unfused(MODELS / f"{spec}.urdf")
     q = _random_q(chain, np.random.default_rng(0), 50)
     x, pose = answer(chain, q)
-    expected = np.array(
-        [mujoco_pose(model, base, tip, dict(zip(chain.joints, row, strict=True))) for row in q]
-    )
+    expected = np.array([mujoco_pose(model, base, tip, dict(zip(chain.joints, row, strict=True))) for row in q])
     np.testing.assert_allclose(pose, expected, atol=SINGLE)
     np.testing.assert_allclose(x, expected[:, :3, 3], atol=SINGLE)
 
@@ -138,3 +135,22 @@ def _with_mimic(text: str, chain: Chain, q: np.ndarray) -> dict[str, float]:
     follower, leader, gain, offset = found.groups()
     values[follower] = float(gain) * values.get(leader, 0.0) + float(offset)
     return values
+
+
+def test_a_follower_of_a_follower_follows_the_first(tmp_path: Path) -> None:
+    """Sliders along x: one = q; two = 2 q + .1; three = -3 two + .5 = -6 q + .2. Their sum is .3 - 3 q."""
+
+    def slider(name: str, parent: str, child: str, mimic: str) -> str:
+        ends = f'<parent link="{parent}"/><child link="{child}"/><limit lower="-1" upper="1"/>'
+        return f'<link name="{child}"/><joint name="{name}" type="prismatic">{ends}{mimic}</joint>'
+
+    path = tmp_path / "sliders.urdf"
+    two = '<mimic joint="one" multiplier="2" offset=".1"/>'
+    three = '<mimic joint="two" multiplier="-3" offset=".5"/>'
+    joints = slider("three", "a", "b", three) + slider("two", "b", "c", two) + slider("one", "c", "d", "")
+    path.write_text(f'<robot><link name="a"/>{joints}</robot>')
+    chain = read_urdf(path)
+    assert chain.joints == ("one",)
+    for q in (0.0, 0.25):
+        x = np.asarray(chain.pose(jnp.array([q])))[:3, 3]
+        np.testing.assert_allclose(x, [0.3 - 3 * q, 0, 0], atol=1e-6)
