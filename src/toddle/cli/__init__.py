@@ -89,7 +89,9 @@ def _help() -> str:
 
 
 def _tell(line: str, exit_code: int) -> int:
-    print(f"toddle: {line}", file=sys.stderr)
+    """One line on standard error; control characters of a file's or a name's own don't reach the terminal."""
+    shown = "".join(c if c.isprintable() else c.encode("unicode_escape", "backslashreplace").decode() for c in line)
+    print(f"toddle: {shown}", file=sys.stderr)
     return exit_code
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 _SAVE_SECONDS = 20.0
 _LIVE_SAMPLES = 5_000
 _LENGTH = re.compile(r"(\d+(?:\.\d+)?)(mm|cm|m)")
+_MOST_NOISE = 1.0  # [m]
 _METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 
 
@@ -50,14 +52,15 @@ class Reach:
         tip: the link whose position is learned.
         base: the link in whose frame it is told.
         joints: the joints that move; the others are held.
-        plant: what moves: the kinematics, or the arm in physics with servos, gravity and sensor noise.
+        plant: what moves: the kinematics, or the arm in physics with servos, gravity and sensor noise; kinematics
+            unless given.
         noise: standard deviation of the seen tip on each axis, in physics, such as 1mm.
         out: the folder to leave; runs/ROBOT unless given.
         json: print one JSON object with the figures, and nothing else.
         resume: a folder to go on in.
         skill: a folder to answer from.
         target: where the tip should go [m].
-        looks: how often the answer may be corrected by looking; 0 for open loop.
+        looks: how often the answer may be corrected by looking, 3 times unless given; 0 for open loop.
         tolerance: error up to which a target counts as reached [m].
     """
 
@@ -75,20 +78,29 @@ class Reach:
     tip: str | None = None
     base: str | None = None
     joints: tuple[str, ...] | None = None
-    plant: Literal["kinematics", "physics"] = "kinematics"
+    plant: Literal["kinematics", "physics"] | None = None
     noise: str | None = None
     out: Path | None = None
     json: bool = False
     resume: Path | None = None
     skill: Path | None = None
     target: tuple[float, ...] | None = None
-    looks: int = 3
+    looks: int | None = None
     tolerance: float | None = None
 
 
 _OF_A_RUN = (
     "method", "learner", "samples", "seed", "hidden", "learning_rate", "perturbation", "test_points",
     "test_spacing", "per_cycle",
+)  # fmt: skip
+_TAKES = {  # the options that each way of calling has, beside --json
+    "robot": {*_OF_A_RUN, "tip", "base", "joints", "plant", "noise", "out"},
+    "resume": {"samples"},
+    "skill": {"target", "looks", "tolerance", "plant", "noise"},
+}
+_FILES = (
+    "run.json", "run.safetensors", "skill.json", "skill.safetensors", "config.json", "figures.json", "course.json",
+    "error.png", "explored.png", "targets.png",
 )  # fmt: skip
 
 
@@ -105,7 +117,9 @@ def main(argv: Sequence[str]) -> int:
 
 def _check_mode(asked: Reach) -> None:
     """Refuse options that contradict each other before anything heavy is imported."""
-    modes = [name for name in ("robot", "skill", "resume") if getattr(asked, name) is not None]
+    modes = [name for name in _TAKES if getattr(asked, name) is not None]
+    if not modes and asked.target is not None:
+        raise BadInput("--skill is missing", where="--target", remedy="give --skill FOLDER --target X Y Z")
     if not modes:
         raise BadInput(
             "no robot is named",
@@ -114,23 +128,29 @@ def _check_mode(asked: Reach) -> None:
         )
     if len(modes) > 1:
         raise BadInput(f"{' and '.join(modes)} exclude each other", where="toddle reach", remedy="give one")
-    if (asked.target is None) != (asked.skill is None):
-        missing, given = ("--target", "--skill") if asked.target is None else ("--skill", "--target")
-        raise BadInput(f"{missing} is missing", where=given, remedy="give --skill FOLDER --target X Y Z")
-    fixed = [name for name in _OF_A_RUN if getattr(asked, name) is not None]
-    extra = [name for name in fixed if asked.skill is not None or (asked.resume is not None and name != "samples")]
-    if extra:
-        flag = "--" + extra[0].replace("_", "-")
-        raise BadInput("it was settled when learning began", where=flag, remedy="leave it out")
+    (mode,) = modes
+    for field in fields(asked):
+        if field.name not in {mode, "json", *_TAKES[mode]} and getattr(asked, field.name) is not None:
+            settled = mode != "robot" and field.name in _TAKES["robot"]
+            raise BadInput(
+                "it was settled when learning began" if settled else f"it doesn't go with a {mode}",
+                where="--" + field.name.replace("_", "-"),
+                remedy="leave it out" if settled else "leave it out, or give --skill FOLDER --target X Y Z",
+            )
+    if mode == "skill" and asked.target is None:
+        raise BadInput("--target is missing", where="--skill", remedy="give --skill FOLDER --target X Y Z")
     if asked.noise is not None and asked.plant != "physics":
         raise BadInput("only physics has sensor noise", where="--noise", remedy="add --plant physics")
-    if asked.looks < 0 or asked.looks > 1000:
+    if asked.looks is not None and not 0 <= asked.looks <= 1000:
         raise BadInput(f"{asked.looks} is out of range", where="--looks", remedy="give 0 to 1000")
+    if asked.tolerance is not None and not asked.tolerance > 0:
+        raise BadInput(f"{asked.tolerance} is out of range", where="--tolerance", remedy="give a distance above 0 [m]")
 
 
 def _learn(asked: Reach) -> int:
+    from toddle.reach.api import suited
     from toddle.reach.config import ReachConfig
-    from toddle.reach.methods import method_named
+    from toddle.reach.methods import learner_named
     from toddle.robots.catalogue import Choice
 
     given = {name: getattr(asked, name) for name in _OF_A_RUN if getattr(asked, name) is not None}
@@ -140,10 +160,11 @@ def _learn(asked: Reach) -> int:
     if given.get("hidden") == (0,):
         given["hidden"] = ()
     config = ReachConfig(**given)
-    method_named(config.method)
+    learner_named(config)
     source = Choice(asked.robot or "", asked.tip, asked.base, asked.joints)
-    how = {"plant": asked.plant, "noise": _metres(asked.noise)}
-    session = _open(source, config, how)
+    how = _how(asked)
+    _refuse_used(asked.out)
+    session = _open(source, suited(config, source.spec), how)
     folder = _new_folder(asked.out, source.spec)
     from toddle.reach.session import start
 
@@ -151,12 +172,14 @@ def _learn(asked: Reach) -> int:
 
 
 def _resume(asked: Reach, folder: Path) -> int:
-    from toddle.outside.skills import choice_from, read_run, resume
+    from toddle.outside.files import make_folder
+    from toddle.outside.skills import read_run, resume
 
     config, facts, tensors = read_run(folder)
     if asked.samples is not None:
         config = replace(config, samples=asked.samples)
-    source, how = choice_from(facts["choice"]), facts["how"]
+    source, how = _recorded(facts, folder)
+    make_folder(folder)
     session = _open(source, config, how)
     cycle = resume(session, tensors, str(folder))
     if cycle.samples >= config.samples:
@@ -166,6 +189,26 @@ def _resume(asked: Reach, folder: Path) -> int:
             remedy=f"ask for more with --samples, such as {2 * cycle.samples}",
         )
     return _run(asked, session, cycle, source, how, folder)
+
+
+def _how(asked: Reach) -> dict[str, Any]:
+    """What moves, in the form that a run remembers."""
+    return {"plant": asked.plant or "kinematics", "noise": _metres(asked.noise)}
+
+
+def _recorded(facts: dict[str, Any], folder: Path) -> tuple[Choice, dict[str, Any]]:
+    """Which robot a saved run has, and what moves."""
+    from toddle.outside.skills import choice_from
+
+    try:
+        how = {"plant": facts["how"]["plant"], "noise": facts["how"]["noise"]}
+        if how["plant"] not in ("kinematics", "physics") or not isinstance(how["noise"], float | None):
+            raise ValueError(f"nothing moves by {how}")
+        return choice_from(facts["choice"]), how
+    except (LookupError, TypeError, ValueError) as fault:
+        raise BadInput(
+            f"it is not a run of this version ({fault})", where=str(folder), remedy="learn it again"
+        ) from fault
 
 
 def _open(source: Choice, config: Any, how: dict[str, Any]) -> Session:
@@ -293,14 +336,14 @@ def _answer(asked: Reach, folder: Path) -> int:
     from toddle.robots.catalogue import load_choice
     from toddle.signals import Verdict
 
+    how, looks = _how(asked), 3 if asked.looks is None else asked.looks
     skill = load_skill(folder)
-    robot = None
-    if asked.looks > 0:
+    body = robot = None
+    if looks > 0:
         body = load_choice(skill.source)
         check_same_robot(skill, body)
-        how = {"plant": asked.plant, "noise": _metres(asked.noise)}
         robot = _mover(body, how, skill.config.seed)
-    answer = solve(skill, asked.target or (), robot=robot, looks=max(asked.looks, 1), tolerance=asked.tolerance)
+    answer = solve(skill, asked.target or (), robot=robot, looks=max(looks, 1), tolerance=asked.tolerance)
     if asked.json:
         print(
             json.dumps(
@@ -317,27 +360,45 @@ def _answer(asked: Reach, folder: Path) -> int:
         )
     elif answer.verdict is not Verdict.OUT_OF_REACH:
         width = max(map(len, skill.joints))
-        for name, value in zip(skill.joints, answer.q, strict=True):
-            print(f"{name:<{width}}  {value:9.5f}  ({math.degrees(value):7.2f} deg)")
+        for name, value, turns in zip(skill.joints, answer.q, _turning(body, skill), strict=True):
+            print(f"{name:<{width}}  {value:9.5f}" + (f"  ({math.degrees(value):7.2f} deg)" if turns else ""))
         print(f"{answer.verdict}: {answer.reason}")
     if answer.verdict is Verdict.OUT_OF_REACH:
         raise BadInput(f"out of reach, {answer.reason}", where="--target", remedy="aim at that, or closer")
     return 0 if answer.verdict is Verdict.REACHED else 1
 
 
+def _turning(body: Body | None, skill: Skill) -> list[bool]:
+    """Which joints are known to turn, so that their values are angles."""
+    from toddle.robots.chain import Chain
+
+    if not isinstance(body, Chain):
+        return [False] * len(skill.joints)
+    return [not any(body.slides[body.gain[:, joint] != 0]) for joint in range(len(skill.joints))]
+
+
+def _refuse_used(out: Path | None) -> None:
+    """Refuse a folder in which a new run would write over something."""
+    if out is None:
+        return
+    if os.path.lexists(out) and not os.path.isdir(out):
+        raise BadInput("it is no folder", where=f"--out {out}", remedy="name another")
+    found = [name for name in _FILES if os.path.lexists(out / name)]
+    if found and found[0] == "run.json":
+        raise BadInput("it holds a run already", where=str(out), remedy=f"go on with --resume {out}, or name another")
+    if found:
+        raise BadInput(f"its {found[0]} would be written over", where=str(out), remedy="name another with --out")
+
+
 def _new_folder(out: Path | None, spec: str) -> Path:
-    """The folder that a new run may write into.
+    """The folder that a new run writes into.
 
     Raises:
-        BadInput: it holds another run, or can't be made.
+        BadInput: it can't be made, or nothing can be written into it.
     """
     from toddle.outside.files import make_folder
 
     if out is not None:
-        if (out / "run.json").exists() or (out / "skill.json").exists():
-            raise BadInput(
-                "it holds a run already", where=str(out), remedy=f"go on with --resume {out}, or name another"
-            )
         return make_folder(out)
     name = re.sub(r"[^\w.-]+", "-", Path(spec).stem if Path(spec).suffix else spec).strip("-") or "robot"
     number = 1
@@ -353,4 +414,7 @@ def _metres(length: str | None) -> float | None:
     match = _LENGTH.fullmatch(length)
     if match is None:
         raise BadInput(f"{length!r} is not a length", where="--noise", remedy="give one with its unit, such as 1mm")
-    return float(match[1]) * _METRES[match[2]]
+    metres = float(match[1]) * _METRES[match[2]]
+    if metres > _MOST_NOISE:
+        raise BadInput(f"{length!r} is out of range", where="--noise", remedy=f"give at most {_MOST_NOISE:g}m")
+    return metres

@@ -7,10 +7,13 @@ before anything of it is used. Nothing here loads pickles or runs what it reads.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import math
 import os
+import stat
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -32,8 +35,10 @@ def write_bytes(path: Path, content: bytes) -> None:
         part.write_bytes(content)
         os.replace(part, path)
     except OSError as fault:
-        part.unlink(missing_ok=True)
         raise ToddleError(f"it can't be written ({fault.strerror})", where=str(path)) from fault
+    finally:  # also when Ctrl-C comes in the middle
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
 
 
 def write_json(path: Path, value: Mapping[str, Any]) -> None:
@@ -53,18 +58,26 @@ def finite(value: Any) -> Any:
 
 
 def make_folder(path: Path) -> Path:
-    """Make a folder, and those above it.
+    """Make a folder that files can be written into, and those above it.
 
     Raises:
-        BadInput: something else is there, or it can't be made.
+        BadInput: something else is there, or it can't be made or written into; nothing is left behind.
     """
+    made: list[Path] = []
     try:
-        path.mkdir(parents=True, exist_ok=True)
+        for folder in [*reversed(path.parents), path]:
+            if not folder.is_dir():
+                folder.mkdir()
+                made.append(folder)
+        with tempfile.TemporaryFile(dir=path):
+            pass
     except OSError as fault:
+        for folder in reversed(made):
+            folder.rmdir()
         raise BadInput(
-            f"no folder can be made here ({fault.strerror})",
+            f"no folder can be made or written into here ({fault.strerror})",
             where=str(path),
-            remedy="name another with --out",
+            remedy="name another",
         ) from fault
     return path
 
@@ -81,7 +94,7 @@ def write_record(
         facts: what isn't a tensor.
         tensors: the arrays by name.
     """
-    content = tensors_to_bytes({key: np.ascontiguousarray(value) for key, value in tensors.items()})
+    content = tensors_to_bytes({key: np.asarray(value, order="C") for key, value in tensors.items()})
     record = {
         "format": f"toddle {kind}",
         "version": 1,
@@ -91,7 +104,7 @@ def write_record(
     }
     record["sha256"] = _digest(record)
     write_bytes(folder / f"{name}.safetensors", content)
-    write_bytes(folder / f"{name}.json", (json.dumps(record, indent=2) + "\n").encode())
+    write_bytes(folder / f"{name}.json", _text(record))
 
 
 def read_record(folder: Path, name: str, kind: str) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
@@ -106,15 +119,18 @@ def read_record(folder: Path, name: str, kind: str) -> tuple[dict[str, Any], dic
     record = _read_json(folder / f"{name}.json", kind)
     path = folder / f"{name}.safetensors"
     content = _read(path, kind)
-    if hashlib.sha256(content).hexdigest() != record["tensors_sha256"]:
+    if hashlib.sha256(content).hexdigest() != record.get("tensors_sha256"):
         raise BadInput("it was altered or cut short since it was written", where=str(path), remedy="learn it again")
     try:
         tensors = tensors_from_bytes(content)
     except SafetensorError as fault:
         raise BadInput(f"it is no safetensors file ({fault})", where=str(path)) from fault
-    if {key: [str(value.dtype), list(value.shape)] for key, value in tensors.items()} != record["tensors"]:
+    if {key: [str(value.dtype), list(value.shape)] for key, value in tensors.items()} != record.get("tensors"):
         raise BadInput("its tensors aren't those that its JSON names", where=str(path), remedy="learn it again")
-    return record["facts"], tensors
+    facts = record.get("facts")
+    if not isinstance(facts, dict):
+        raise BadInput("it holds no facts", where=str(folder / f"{name}.json"), remedy="learn it again")
+    return facts, tensors
 
 
 def _read_json(path: Path, kind: str) -> dict[str, Any]:
@@ -129,22 +145,32 @@ def _read_json(path: Path, kind: str) -> dict[str, Any]:
         raise BadInput(f"it is a {record['format']}, not a toddle {kind}", where=str(path))
     if record.get("version") != 1:
         raise BadInput(f"it has version {record.get('version')!r}", where=str(path), remedy="update toddle")
-    if record.get("sha256") != _digest({key: value for key, value in record.items() if key != "sha256"}):
+    digest = _digest({key: value for key, value in record.items() if key != "sha256"})
+    if record.get("sha256") != digest or content != _text(record):
         raise BadInput("it was altered since it was written", where=str(path), remedy="learn it again")
     return record
 
 
 def _read(path: Path, kind: str) -> bytes:
-    if path.parent.exists() and not path.parent.is_dir():
-        raise BadInput("it is no folder", where=str(path.parent), remedy=f"name the folder of a {kind}")
+    remedy = f"name the folder of a {kind}"
     try:
-        if path.stat().st_size > _LARGEST:
-            raise BadInput("it is larger than any skill", where=str(path))
+        found = path.stat()
+        if not stat.S_ISREG(found.st_mode):  # a pipe would wait for ever, a device never end
+            raise BadInput("it is no file", where=str(path), remedy=remedy)
+        if found.st_size > _LARGEST:
+            raise BadInput(f"it is larger than any {kind}", where=str(path), remedy=remedy)
         return path.read_bytes()
     except FileNotFoundError:
-        raise BadInput(f"there is no {kind} here", where=str(path), remedy=f"name the folder of a {kind}") from None
-    except (OSError, ValueError) as fault:
-        raise BadInput(f"it can't be read ({fault})", where=str(path)) from fault
+        raise BadInput(f"there is no {kind} here", where=str(path), remedy=remedy) from None
+    except NotADirectoryError:
+        raise BadInput("it is no folder", where=str(path.parent), remedy=remedy) from None
+    except OSError as fault:
+        raise BadInput(f"it can't be read ({fault.strerror})", where=str(path), remedy=remedy) from fault
+
+
+def _text(record: Mapping[str, Any]) -> bytes:
+    """The one way in which a record is written, so that any altered byte can be told."""
+    return (json.dumps(record, indent=2) + "\n").encode()
 
 
 def _digest(record: Mapping[str, Any]) -> str:

@@ -28,6 +28,7 @@ from toddle.robots.body import Resumable
 from toddle.robots.catalogue import Choice
 
 _SKILL, _RUN = "skill", "run"
+_AGAIN = "learn it again"
 _BOX = ("joint_lower", "joint_span", "space_lower", "space_span")
 _PLAIN = ("home", "seen", "targets", "errors")
 
@@ -69,13 +70,28 @@ def load_skill(folder: str | os.PathLike[str]) -> Skill:
         space, joints = len(box.space_lower), len(box.joint_lower)
         template = jax.eval_shape(learner.init, jax.random.key(0), jnp.zeros(space), jnp.zeros(joints))
         state = _unflat("state", template, tensors)
+        _check(tensors, joints, space)
         home, seen, targets, errors = (tensors[name] for name in _PLAIN)
+        names = _texts(facts["joints"], joints)
         return Skill(
-            choice_from(facts["source"]), tuple(facts["joints"]), home, config, hidden, box,
-            learner, state, seen, targets, errors, facts["figures"],
+            choice_from(facts["source"]), names, home, config, hidden, box,
+            learner, state, seen, targets, errors, dict(facts["figures"]),
         )  # fmt: skip
-    except (KeyError, TypeError, ValueError) as fault:
-        raise BadInput(f"it is not a skill of this version ({fault})", where=str(path)) from fault
+    except (LookupError, TypeError, ValueError, BadInput) as fault:
+        raise BadInput(f"it is not a skill of this version ({fault})", where=str(path), remedy=_AGAIN) from fault
+
+
+def _check(tensors: Mapping[str, np.ndarray], joints: int, space: int) -> None:
+    """Refuse tensors that don't fit each other, or that aren't finite."""
+    points, seen = len(tensors["targets"]), len(tensors["seen"])
+    shapes = {"home": (joints,), "seen": (seen, space), "targets": (points, space), "errors": (points,)}
+    shapes |= {"box.joint_span": (joints,), "box.space_span": (space,)}
+    for name, shape in shapes.items():
+        if tensors[name].shape != shape or not len(tensors[name]):
+            raise ValueError(f"{name} has shape {list(tensors[name].shape)}")
+    for name, tensor in tensors.items():
+        if not np.all(np.isfinite(tensor)):
+            raise ValueError(f"{name} is not finite")
 
 
 def save_run(folder: Path, session: Session, cycle: Cycle, source: Mapping[str, Any]) -> None:
@@ -89,6 +105,7 @@ def save_run(folder: Path, session: Session, cycle: Cycle, source: Mapping[str, 
     """
     tensors = _flat("progress", _with_key_data(cycle.progress))
     tensors |= {f"history.{name}": _column(cycle, name) for name in loop.Scores._fields}
+    tensors |= _of_the_robot(session)
     if isinstance(session.body, Resumable):
         tensors |= {f"plant.{name}": value for name, value in session.body.state().items()}
     write_record(folder, "run", _RUN, {"config": asdict(session.config), "source": dict(source)}, tensors)
@@ -103,8 +120,8 @@ def read_run(folder: Path) -> tuple[ReachConfig, dict[str, Any], dict[str, np.nd
     facts, tensors = read_record(folder, "run", _RUN)
     try:
         return _config(facts["config"]), dict(facts["source"]), tensors
-    except (KeyError, TypeError, ValueError) as fault:
-        raise BadInput(f"it is not a run of this version ({fault})", where=str(folder)) from fault
+    except (LookupError, TypeError, ValueError, BadInput) as fault:
+        raise BadInput(f"it is not a run of this version ({fault})", where=str(folder), remedy=_AGAIN) from fault
 
 
 def resume(session: Session, tensors: Mapping[str, np.ndarray], where: str) -> Cycle:
@@ -115,22 +132,44 @@ def resume(session: Session, tensors: Mapping[str, np.ndarray], where: str) -> C
     """
     template = eqx.filter_eval_shape(lambda: _with_key_data(start(session).progress))
     try:
+        for name, now in _of_the_robot(session).items():
+            if tensors[name].shape != now.shape or not np.allclose(tensors[name], now, rtol=1e-4, atol=1e-5):
+                raise ValueError(f"{name} was {tensors[name]} and is {now}")
         progress = _unflat("progress", template, tensors)
         rows = zip(*(tensors[f"history.{name}"] for name in loop.Scores._fields), strict=True)
         history = tuple(loop.Scores(*row) for row in rows)
         plant = {name[6:]: value for name, value in tensors.items() if name.startswith("plant.")}
         if isinstance(session.body, Resumable):
             session.body.restore(plant)
-    except (KeyError, ValueError, ToddleError) as fault:
-        raise BadInput(f"it does not fit this robot ({fault})", where=where) from fault
+    except (KeyError, TypeError, ValueError, ToddleError) as fault:
+        raise BadInput(f"it does not fit this robot ({fault})", where=where, remedy=_AGAIN) from fault
     key = jax.random.wrap_key_data(progress.key)
     return Cycle(progress._replace(key=key), history)
 
 
 def choice_from(facts: Mapping[str, Any]) -> Choice:
-    """What was asked for, from its saved form."""
+    """What was asked for, from its saved form.
+
+    Raises:
+        LookupError, TypeError, ValueError: it is none.
+    """
+    (spec,) = _texts([facts["spec"]], 1)
+    tip, base = (None if facts[name] is None else _texts([facts[name]], 1)[0] for name in ("tip", "base"))
     joints = facts["joints"]
-    return Choice(**{**facts, "joints": None if joints is None else tuple(joints)})
+    return Choice(spec, tip, base, None if joints is None else _texts(joints, len(joints)))
+
+
+def _texts(values: Any, count: int) -> tuple[str, ...]:
+    if not isinstance(values, list) or len(values) != count or not all(isinstance(text, str) for text in values):
+        raise ValueError(f"{values!r} are not {count} names")
+    return tuple(values)
+
+
+def _of_the_robot(session: Session) -> dict[str, np.ndarray]:
+    """What tells one robot from another: its limits, the extent of its workspace, its home."""
+    box, home = session.setting.box, session.setting.home
+    tensors = {f"box.{name}": np.asarray(getattr(box, name)) for name in _BOX}
+    return tensors | {"home.q": np.asarray(home.q), "home.x": np.asarray(home.x)}
 
 
 def _config(facts: Mapping[str, Any]) -> ReachConfig:

@@ -93,6 +93,20 @@ def method_named(name: str) -> Method:
     return METHODS[name]
 
 
+def learner_named(config: ReachConfig) -> str:
+    """The name of the learner that a configuration asks for; needs no robot.
+
+    Raises:
+        BadInput: no such method or learner, or an option that it hasn't.
+    """
+    name = method_named(config.method).learner if config.learner is None else config.learner
+    if name not in LEARNERS:
+        raise unknown_name("learner", name, LEARNERS, where="--learner")
+    if name != "perceptron" and config.hidden is not None:
+        raise BadInput(f"{name} has no hidden layers", where="--hidden", remedy="add --learner perceptron")
+    return name
+
+
 def make_explorer(config: ReachConfig, box: UnitBox) -> Explorer:
     """The explorer that a configuration asks for, in a body's unit box."""
     return method_named(config.method).explorer(config, box)
@@ -109,12 +123,7 @@ def make_learner(config: ReachConfig, box: UnitBox, hidden: tuple[int, ...]) -> 
     Raises:
         BadInput: no such learner, or an option that it hasn't.
     """
-    name = config.learner or method_named(config.method).learner
-    if name not in LEARNERS:
-        raise unknown_name("learner", name, LEARNERS, where="--learner")
-    if name != "perceptron" and config.hidden is not None:
-        raise BadInput(f"{name} has no hidden layers", where="--hidden", remedy="add --learner perceptron")
-    return LEARNERS[name](config, box, hidden)
+    return LEARNERS[learner_named(config)](config, box, hidden)
 
 
 def _or(value: float | None, default: float) -> float:
@@ -123,4 +132,4 @@ def _or(value: float | None, default: float) -> float:
 
 def needs_equal_scales(config: ReachConfig) -> bool:
     """Whether the learner measures distances in space, so that one scale must serve all axes."""
-    return (config.learner or method_named(config.method).learner) == "local-linear"
+    return learner_named(config) == "local-linear"

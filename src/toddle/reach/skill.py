@@ -27,6 +27,7 @@ from toddle.signals import Solution, Verdict
 
 _NEIGHBOURS = 5  # held-out errors averaged for the error to expect
 _AT_LIMIT = 1e-3  # a joint closer to its limit than this share of its range stands at it
+_FARTHEST = 1e6  # [m]
 _GAP = 3.0  # a target this many typical gaps away from everything visited is out of reach
 
 
@@ -162,6 +163,6 @@ def _checked_target(skill: Skill, target: Sequence[float] | np.ndarray) -> Float
     if aim.shape != (space,):
         got = "x".join(map(str, aim.shape)) or "one number"
         raise BadInput(f"it has {got}", where="target", remedy=f"give {space} coordinates [m]")
-    if not np.all(np.isfinite(aim)):
-        raise BadInput("a coordinate is not a finite number", where="target", remedy=f"give {space} numbers [m]")
+    if not np.all(np.abs(aim) < _FARTHEST):  # false for nan, too
+        raise BadInput("a coordinate is no finite distance", where="target", remedy=f"give {space} numbers [m]")
     return aim

@@ -35,7 +35,12 @@ def _perceptron_query(skill: Skill) -> Query:
     def answer(target: Float[np.ndarray, " space"]) -> Float[np.ndarray, " joints"]:
         x = (target - shift) * scale
         for weights, bias in hidden:
-            x = 1 / (1 + np.exp(-(weights @ x + bias)))
-        return low + span / (1 + np.exp(-(last @ x + last_bias)))
+            x = _sigmoid(weights @ x + bias)
+        return low + span * _sigmoid(last @ x + last_bias)
 
     return answer
+
+
+def _sigmoid(z: np.ndarray) -> np.ndarray:
+    """1 / (1 + exp(-z)), in the form that can't overflow."""
+    return 0.5 + 0.5 * np.tanh(0.5 * z)
