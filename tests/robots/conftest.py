@@ -20,9 +20,7 @@ Answer = Callable[[Chain, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 def _frame(model: mujoco.MjModel, data: mujoco.MjData, name: str) -> np.ndarray:
     frame = np.eye(4)
-    place = (
-        data.body(name) if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) >= 0 else data.site(name)
-    )
+    place = data.body(name) if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) >= 0 else data.site(name)
     frame[:3, :3], frame[:3, 3] = place.xmat.reshape(3, 3), place.xpos
     return frame
 

@@ -99,7 +99,7 @@ def _packed(points: np.ndarray, apart: float) -> int:
     return len(kept)
 
 
-@pytest.mark.parametrize("spec", ["nicu", "suralp"])
+@pytest.mark.parametrize("spec", ["nicu-wide", "suralp-wide"])
 def test_an_arm_has_room_for_the_documents_test_points(spec: str) -> None:
     """Taken greedily from random postures; with the ranges read as total spans a quarter would fit."""
     record, body = robots.record(spec), robots.load(spec)
@@ -144,7 +144,7 @@ def test_part_of_an_arm_can_be_chosen() -> None:
 def test_a_joint_that_is_not_chosen_stays_at_zero_or_as_near_as_it_can(tmp_path: Path) -> None:
     text = (MODELS / "nicu.urdf").read_text()
     path = tmp_path / "nicu.urdf"
-    path.write_text(text.replace('lower="-0.3490659" upper="0.3490659"', 'lower="0.2" upper="0.3"'))
+    path.write_text(text.replace('lower="-0.1745329" upper="0.1745329"', 'lower="0.2" upper="0.3"'))
     part, whole = robots.load(path, joints=["arm_x"]), robots.load("nicu")
     x = whole.forward(jnp.array([0.0, 0.2, 0.7, 0.0]))
     np.testing.assert_allclose(np.asarray(part.forward(jnp.array([0.7]))), np.asarray(x), atol=1e-6)

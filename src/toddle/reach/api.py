@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from toddle.failures import BadInput
+from toddle.failures import BadInput, unknown_name
 from toddle.reach.config import ReachConfig
 from toddle.reach.evaluate.figures import error_figures, errors_of, query_figures, reach_figures
 from toddle.reach.evaluate.seen import draw_seen, kept
@@ -37,7 +37,7 @@ class Options(TypedDict, total=False):
     learning_rate: float | None
     perturbation: float | None
     per_cycle: int
-    test_points: int
+    test_points: int | None
     test_spacing: float | None
 
 
@@ -57,11 +57,12 @@ def learn(
     Raises:
         BadInput: an option that there isn't, is out of range, or doesn't fit the robot.
     """
-    unknown = set(options) - set(ReachConfig.__dataclass_fields__)
-    if unknown:
-        raise BadInput(f"no option named {sorted(unknown)[0]!r}", where="learn")
+    known = ReachConfig.__dataclass_fields__
+    for name in options:
+        if name not in known:
+            raise unknown_name("option", name, known, where="learn")
     body = load(robot) if isinstance(robot, str) else robot
-    session = open_session(body, ReachConfig(**options), hidden=hidden_of(body.name))
+    session = open_session(body, suited(ReachConfig(**options), body.name), hidden=hidden_of(body.name))
     began = time.perf_counter()
     cycle = start(session)
     for latest in cycles(session, cycle):
@@ -123,8 +124,10 @@ def evaluate(
         Open-loop and closed-loop errors [mm]: mean, median, 99th percentile and maximum of each.
 
     Raises:
-        BadInput: the robot isn't the one of the skill: other joints, or other limits.
+        BadInput: the robot isn't the one of the skill: other joints, or other limits; or no points are asked for.
     """
+    if points < 1:
+        raise BadInput(f"{points} points", where="evaluate", remedy="give at least 1")
     if robot is None or isinstance(robot, str):
         robot = load_choice(replace(skill.source, spec=robot or skill.source.spec))
     check_same_robot(skill, robot)
@@ -158,3 +161,13 @@ def hidden_of(spec: str) -> tuple[int, ...]:
     """The hidden layers that suit a robot of the catalogue; a middling size for any other."""
     known = record(spec)
     return known.hidden if known is not None else (40, 40)
+
+
+def suited(config: ReachConfig, spec: str) -> ReachConfig:
+    """The configuration with the test set of the robot's document, where there is one and none was asked for."""
+    known = record(spec)
+    if known is None or not known.test_points or config.test_points is not None:
+        return config
+    return replace(
+        config, test_points=known.test_points, test_spacing=config.test_spacing or known.test_spacing or None
+    )

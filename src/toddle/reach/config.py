@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from toddle.failures import BadInput
@@ -24,7 +23,7 @@ class ReachConfig:
         perturbation: size of exploration: of each component in the unit box for goal-and-motor babbling, of the
             exploratory noise [rad] for goal babbling, of a step as a fraction of the range for continuous babbling.
         per_cycle: movements between two tests.
-        test_points: size of the fixed test set.
+        test_points: size of the fixed test set; the document's, or 110.
         test_spacing: least distance between its points [m].
     """
 
@@ -36,7 +35,7 @@ class ReachConfig:
     learning_rate: float | None = None
     perturbation: float | None = None
     per_cycle: int = 2000
-    test_points: int = 110
+    test_points: int | None = None
     test_spacing: float | None = None
 
     def __post_init__(self) -> None:
@@ -48,20 +47,24 @@ class ReachConfig:
         _within("samples", self.samples, 1, MOST_SAMPLES)
         _within("seed", self.seed, 0, 2**32 - 1)
         _within("per-cycle", self.per_cycle, 1, 1_000_000)
-        _within("test-points", self.test_points, 1, 10_000)
+        _within("test-points", 110 if self.test_points is None else self.test_points, 1, 10_000)
+        if not isinstance(self.hidden, tuple | None):
+            raise BadInput(f"{self.hidden!r} is no tuple", where="--hidden", remedy="give a tuple, such as (10,)")
         for size in self.hidden or ():
             _within("hidden", size, 1, 4096)
         if len(self.hidden or ()) > 8:
             raise BadInput(f"{len(self.hidden or ())} layers", where="--hidden", remedy="give 8 or fewer")
         for name in ("learning_rate", "perturbation", "test_spacing"):
             value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and 0 < value <= 100):
+            if value is not None and not (isinstance(value, float | int) and 0 < value <= 100):
                 raise BadInput(
-                    f"{value} is out of range", where=_flag(name), remedy="give a number above 0, at most 100"
+                    f"{value!r} is out of range", where=_flag(name), remedy="give a number above 0, at most 100"
                 )
 
 
 def _within(name: str, value: int, least: int, most: int) -> None:
+    if not isinstance(value, int):
+        raise BadInput(f"{value!r} is no whole number", where=_flag(name), remedy=f"give {least} to {most}")
     if not least <= value <= most:
         raise BadInput(f"{value} is out of range", where=_flag(name), remedy=f"give {least} to {most}")
 

@@ -27,6 +27,7 @@ from toddle.reach.unit_box import around, sample_reachable
 from toddle.robots.body import Body, Plant
 
 _SURVEY = 50_000  # postures that show a body's workspace; forward kinematics are cheap
+_TEST_POINTS = 110  # the size of the thesis's fixed set (section 4.2)
 _LIVE_SURVEY = 1_000  # the same on a plant, where each is a movement
 
 
@@ -98,7 +99,7 @@ def open_session(
         make_explorer(config, box),
         make_learner(config, box, hidden),
     )
-    targets, spacing = fixed_targets(positions, config.test_points, config.test_spacing)
+    targets, spacing = fixed_targets(positions, config.test_points or _TEST_POINTS, config.test_spacing)
     cells = cells_per_axis(positions.shape[1]) ** positions.shape[1]
     reached = cell_of(box.x_to_unit(jnp.asarray(positions, jnp.float32)))
     return Session(config, body, setting, targets, spacing, jnp.zeros(cells, bool).at[reached].set(True))

@@ -37,7 +37,7 @@ class Robot:
         source: the document or package its numbers come from.
         file: its description, where toddle ships one (physics needs the masses in it).
         test_points: how many points the document's fixed test set has; 0: none is documented.
-        test_spacing: the least distance between two of them [m].
+        test_spacing: the least distance between two of them [m]; 0: the widest at which they fit.
         hidden: hidden layers that suit its learner.
         published: the document's mean errors [mm], by the name of the figure.
     """
@@ -134,8 +134,20 @@ def _nicu(choice: Choice) -> Body:
     return _read(MODELS / "nicu.urdf", choice)
 
 
+def _nicu_wide(choice: Choice) -> Body:
+    from toddle.robots import ranges
+
+    return ranges.in_degrees(_nicu(choice), "nicu-wide", _NICU_WIDE)
+
+
 def _suralp(choice: Choice) -> Body:
     return _read(MODELS / "suralp.urdf", choice)
+
+
+def _suralp_wide(choice: Choice) -> Body:
+    from toddle.robots import ranges
+
+    return ranges.in_degrees(_suralp(choice), "suralp-wide", _SURALP_WIDE)
 
 
 def _icub_arm(choice: Choice) -> Body:
@@ -175,12 +187,35 @@ def _bha(choice: Choice) -> Body:
     return continuum.bha()
 
 
+_NICU_WIDE = {
+    "shoulder_z": (-70.0, 50.0),
+    "shoulder_y": (-20.0, 20.0),
+    "arm_x": (-90.0, 90.0),
+    "elbow_y": (-90.0, 90.0),
+}
+_SURALP_WIDE = {
+    "shoulder_y": (-90.0, 90.0),
+    "shoulder_x": (-90.0, 90.0),
+    "shoulder_z": (-45.0, 45.0),
+    "elbow_y": (-90.0, 90.0),
+}
+
 _ROBOTS = (
     Robot(
         "nicu",
         "right arm of the humanoid NICU, four joints",
         _nicu,
         "Mahboob 2015, chapters 3 and 4",
+        file=MODELS / "nicu.urdf",
+        test_points=110,
+        hidden=(10,),
+        published={"fixed_error_mean_mm": 24.7, "seen_error_mean_mm": 18.0},
+    ),
+    Robot(
+        "nicu-wide",
+        "the same arm, its ranges read as plus or minus",
+        _nicu_wide,
+        "Mahboob 2015, section 4.3",
         file=MODELS / "nicu.urdf",
         test_points=110,
         test_spacing=0.10,
@@ -192,6 +227,16 @@ _ROBOTS = (
         "right arm of the humanoid SURALP, four joints",
         _suralp,
         "Mahboob 2015, chapter 5",
+        file=MODELS / "suralp.urdf",
+        test_points=60,
+        hidden=(40, 40),
+        published={"fixed_error_mean_mm": 28.0, "seen_error_mean_mm": 19.0},
+    ),
+    Robot(
+        "suralp-wide",
+        "the same arm, its ranges read as plus or minus",
+        _suralp_wide,
+        "Mahboob 2015, section 5.3",
         file=MODELS / "suralp.urdf",
         test_points=60,
         test_spacing=0.16,
