@@ -63,6 +63,7 @@ class Parameters:
 FULL = Parameters()
 QUICK = replace(FULL, seeds=2, hidden=(0, 1, 2, 5, 10, 50))
 HOURS_A_CELL = 2.0  # of the document, section 4.4.4
+FEWEST_RANKED = 5  # cells that a table must have for its own rank correlation to say something
 
 
 @dataclass(frozen=True)
@@ -195,7 +196,9 @@ def run(task: Task) -> Outcome:
     )
     figures = {
         "rank_correlation": correlation,
-        "rank_correlation_by_table": {name: correlation_of(rows) for name, rows in grouped(table).items()},
+        "rank_correlation_by_table": {
+            name: correlation_of(rows) for name, rows in grouped(table).items() if len(rows) >= FEWEST_RANKED
+        },
         "seconds": seconds,
         "cpu_seconds": cpu_seconds,
         "samples_per_cpu_second": movements / cpu_seconds,
