@@ -35,6 +35,7 @@ class Body(eqx.Module):
         """How many coordinates the tip's position has: 2 in the plane, else 3."""
 
 
+@runtime_checkable
 class Plant(Protocol):
     """Whatever moves when it is told to, one movement at a time: physics, a real robot, a callable."""
 
