@@ -31,19 +31,19 @@ class UnitBox(eqx.Module):
 
     def q_to_unit(self, q: Float[Array, "*batch joints"]) -> Float[Array, "*batch joints"]:
         """Joint values [rad or m] to the unit box."""
-        return (q - self.joint_lower) / self.joint_span
+        return (q - _like(q, self.joint_lower)) / _like(q, self.joint_span)
 
     def q_from_unit(self, q: Float[Array, "*batch joints"]) -> Float[Array, "*batch joints"]:
         """Unit-box joint values to physical ones [rad or m]."""
-        return self.joint_lower + q * self.joint_span
+        return _like(q, self.joint_lower) + q * _like(q, self.joint_span)
 
     def x_to_unit(self, x: Float[Array, "*batch space"]) -> Float[Array, "*batch space"]:
         """Tip positions [m] to the unit box."""
-        return (x - self.space_lower) / self.space_span
+        return (x - _like(x, self.space_lower)) / _like(x, self.space_span)
 
     def x_from_unit(self, x: Float[Array, "*batch space"]) -> Float[Array, "*batch space"]:
         """Unit-box positions to metres."""
-        return self.space_lower + x * self.space_span
+        return _like(x, self.space_lower) + x * _like(x, self.space_span)
 
 
 def around(
@@ -81,5 +81,10 @@ def sample_reachable(
 ) -> tuple[Float[Array, "count joints"], Float[Array, "count space"]]:
     """Joint values drawn uniformly over their ranges [rad or m], and where they bring the tip [m]."""
     fraction = jax.random.uniform(key, (count, len(body.joints)))
-    q = body.lower + fraction * (body.upper - body.lower)
+    q = _like(fraction, body.lower) + fraction * _like(fraction, body.upper - body.lower)
     return q, jax.vmap(body.forward)(q)
+
+
+def _like(batch: Float[Array, "*batch axes"], row: Float[Array, " axes"]) -> Float[Array, "*batch axes"]:
+    """The row for every entry of a batch."""
+    return jnp.broadcast_to(row, batch.shape)

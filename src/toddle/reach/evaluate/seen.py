@@ -46,8 +46,8 @@ def cell_of(x: Float[Array, "*batch space"]) -> Int[Array, "*batch"]:
     """The flat index of the grid cell that a unit-box position lies in (edge cells take what is outside)."""
     resolution = cells_per_axis(x.shape[-1])
     index = jnp.clip(jnp.floor(x * resolution).astype(jnp.int32), 0, resolution - 1)
-    strides = jnp.array([resolution**axis for axis in range(x.shape[-1])])
-    return jnp.sum(index * strides, axis=-1)
+    strides = jnp.array([resolution**axis for axis in range(x.shape[-1])], jnp.int32)
+    return index @ strides
 
 
 def remember(seen: Seen, key: jax.Array, x: Float[Array, "chunk space"]) -> Seen:
