@@ -46,6 +46,8 @@ class Reach:
         hidden: units of each hidden layer of the perceptron; 0 for none.
         learning_rate: step of the learner.
         perturbation: size of exploration.
+        network: the perceptron with our refinements, or plain, as the thesis's tables have it.
+        reading: of the thesis's algorithm: the one that reproduces its tables, or its literal words.
         test_points: size of the fixed test set.
         test_spacing: least distance between its points [m].
         per_cycle: movements between two tests.
@@ -72,6 +74,8 @@ class Reach:
     hidden: tuple[int, ...] | None = None
     learning_rate: float | None = None
     perturbation: float | None = None
+    network: Literal["refined", "plain"] | None = None
+    reading: Literal["tables", "literal"] | None = None
     test_points: int | None = None
     test_spacing: float | None = None
     per_cycle: int | None = None
@@ -90,8 +94,8 @@ class Reach:
 
 
 _OF_A_RUN = (
-    "method", "learner", "samples", "seed", "hidden", "learning_rate", "perturbation", "test_points",
-    "test_spacing", "per_cycle",
+    "method", "learner", "samples", "seed", "hidden", "learning_rate", "perturbation", "network",
+    "reading", "test_points", "test_spacing", "per_cycle",
 )  # fmt: skip
 _TAKES = {  # the options that each way of calling has, beside --json
     "robot": {*_OF_A_RUN, "tip", "base", "joints", "plant", "noise", "out"},

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TypedDict, Unpack
+from typing import Literal, TypedDict, Unpack
 
 import jax
 import jax.numpy as jnp
@@ -13,12 +13,11 @@ import numpy as np
 
 from toddle.failures import BadInput, unknown_name
 from toddle.reach.config import ReachConfig
-from toddle.reach.evaluate.figures import error_figures, errors_of, query_figures, reach_figures
+from toddle.reach.evaluate.figures import error_figures, errors_of, query_figures
 from toddle.reach.evaluate.seen import draw_seen, kept
 from toddle.reach.observe import observer
 from toddle.reach.session import Cycle, Session, cycles, open_session, start
 from toddle.reach.skill import Skill
-from toddle.reach.solve.correction import correct
 from toddle.reach.solve.query import query_of
 from toddle.robots.body import Body, Plant
 from toddle.robots.catalogue import Choice, load, load_choice, record
@@ -36,6 +35,8 @@ class Options(TypedDict, total=False):
     hidden: tuple[int, ...] | None
     learning_rate: float | None
     perturbation: float | None
+    network: Literal["refined", "plain"]
+    reading: Literal["tables", "literal"]
     per_cycle: int
     test_points: int | None
     test_spacing: float | None
@@ -87,8 +88,7 @@ def skill_of(session: Session, cycle: Cycle, source: Choice, *, seconds: float =
     seen = np.asarray(setting.box.x_from_unit(jnp.asarray(kept(progress.seen))), float)
     key = jax.random.fold_in(progress.key, 1)
     seen_targets = np.asarray(setting.box.x_from_unit(draw_seen(progress.seen, key, len(session.targets))), float)
-    predict = lambda targets: session.predict(progress, targets)  # noqa: E731
-    figures, errors, _ = reach_figures(predict, session.observe, session.targets, seen_targets, LOOKS)
+    errors = errors_of(lambda x: session.predict(progress, x), session.observe, session.targets)
     hidden = getattr(setting.learner, "hidden", ())
     skill = Skill(
         source, session.body.joints, np.asarray(session.body.home, float), session.config, hidden,
@@ -99,7 +99,9 @@ def skill_of(session: Session, cycle: Cycle, source: Choice, *, seconds: float =
         "method": session.config.method,
         "samples": cycle.samples,
         "seed": session.config.seed,
-        **figures,
+        **error_figures("fixed_error", errors),
+        **error_figures("seen_error", errors_of(skill.predict, session.observe, seen_targets)),
+        **error_figures("closed_loop_error", skill.reach_for(session.observe, session.targets, LOOKS)[1][-1]),
         "coverage_percent": 100 * float(cycle.history[-1].coverage) if cycle.history else 0.0,
         "test_points": len(session.targets),
         "test_spacing_mm": 1000 * session.spacing,
@@ -134,10 +136,9 @@ def evaluate(
     observe = observer(robot)
     fraction = np.random.default_rng(seed).random((points, len(skill.joints)))
     targets = observe(np.asarray(skill.box.q_from_unit(jnp.asarray(fraction, jnp.float32))))
-    closed = correct(skill.predict, observe, targets, LOOKS)[1][-1]
     return {
         **error_figures("open_loop_error", errors_of(skill.predict, observe, targets)),
-        **error_figures("closed_loop_error", closed),
+        **error_figures("closed_loop_error", skill.reach_for(observe, targets, LOOKS)[1][-1]),
     }
 
 

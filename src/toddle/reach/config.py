@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from toddle.failures import BadInput
 
@@ -22,6 +23,9 @@ class ReachConfig:
         learning_rate: step of the learner.
         perturbation: size of exploration: of each component in the unit box for goal-and-motor babbling, of the
             exploratory noise [rad] for goal babbling, of a step as a fraction of the range for continuous babbling.
+        network: the perceptron with our refinements (inputs in [-1, 1], an output margin, answers from averaged
+            weights), or plain, as the thesis's tables have it.
+        reading: of the thesis's algorithm: the one that reproduces its tables, or its literal words.
         per_cycle: movements between two tests.
         test_points: size of the fixed test set; the document's, or 110.
         test_spacing: least distance between its points [m].
@@ -34,6 +38,8 @@ class ReachConfig:
     hidden: tuple[int, ...] | None = None
     learning_rate: float | None = None
     perturbation: float | None = None
+    network: Literal["refined", "plain"] = "refined"
+    reading: Literal["tables", "literal"] = "tables"
     per_cycle: int = 2000
     test_points: int | None = None
     test_spacing: float | None = None

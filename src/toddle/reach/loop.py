@@ -100,7 +100,7 @@ def answer(
     setting: Setting, progress: Progress, targets: Float[Array, "points space"]
 ) -> Float[Array, "points joints"]:
     """One-shot answers for targets [m]: joint values within their limits [rad or m]."""
-    predict = jax.vmap(lambda x: setting.learner.predict(progress.learner, x))
+    predict = jax.vmap(lambda x: setting.learner.answer(progress.learner, x))
     return setting.box.q_from_unit(jnp.clip(predict(setting.box.x_to_unit(targets)), 0.0, 1.0))
 
 

@@ -13,7 +13,7 @@ from toddle.reach.explore.explorer import Explorer
 from toddle.reach.explore.goal_and_motor import GoalAndMotorBabbling
 from toddle.reach.explore.motor import ContinuousMotorBabbling, MotorBabbling
 from toddle.reach.learn.learner import Learner
-from toddle.reach.learn.perceptron import Perceptron
+from toddle.reach.learn.perceptron import Perceptron, refined
 from toddle.reach.unit_box import UnitBox
 
 
@@ -37,7 +37,10 @@ class Method:
 
 
 def _goal_and_motor(config: ReachConfig, box: UnitBox) -> Explorer:
-    return GoalAndMotorBabbling(jnp.float32(_or(config.perturbation, 0.233)))
+    size = jnp.float32(_or(config.perturbation, 0.233))
+    return (
+        GoalAndMotorBabbling(size, ends="all", stall=0.0) if config.reading == "literal" else GoalAndMotorBabbling(size)
+    )
 
 
 def _motor(config: ReachConfig, box: UnitBox) -> Explorer:
@@ -49,7 +52,9 @@ def _continuous_motor(config: ReachConfig, box: UnitBox) -> Explorer:
 
 
 def _perceptron(config: ReachConfig, box: UnitBox, hidden: tuple[int, ...]) -> Learner:
-    return Perceptron(jnp.float32(_or(config.learning_rate, 0.717)), hidden if config.hidden is None else config.hidden)
+    layers = hidden if config.hidden is None else config.hidden
+    rate = jnp.float32(_or(config.learning_rate, 0.717))
+    return refined(rate, layers) if config.network == "refined" else Perceptron(rate, layers)
 
 
 _METHODS = (

@@ -18,8 +18,8 @@ from jaxtyping import Array, Float
 from toddle.failures import BadInput
 from toddle.reach.config import ReachConfig
 from toddle.reach.learn.learner import Learner
-from toddle.reach.observe import observer
-from toddle.reach.solve.correction import correct
+from toddle.reach.observe import Observe, observer
+from toddle.reach.solve.closed_loop import reach_for
 from toddle.reach.unit_box import UnitBox
 from toddle.robots.body import Body, Plant
 from toddle.robots.catalogue import Choice
@@ -67,6 +67,12 @@ class Skill:
         """One-shot answers for targets [m], within the joint limits [rad or m]."""
         return np.asarray(_predict(self.box, self.learner, self.state, jnp.asarray(targets, jnp.float32)))
 
+    def reach_for(
+        self, observe: Observe, targets: Float[np.ndarray, "batch space"], looks: int
+    ) -> tuple[Float[np.ndarray, "batch joints"], Float[np.ndarray, "answers batch"]]:
+        """Answers for targets [m], corrected by looking; and the best error after 0, 1, ... looks [m]."""
+        return reach_for(self.box, self.learner, self.state, observe, targets, looks)
+
     def expected_error(self, target: Float[np.ndarray, " space"]) -> float:
         """The open-loop error to expect at a target [m]: the mean over the nearest held-out test targets."""
         near = np.argsort(np.sum((self.targets - target) ** 2, axis=1))[:_NEIGHBOURS]
@@ -81,7 +87,7 @@ class Skill:
 
 @eqx.filter_jit
 def _predict(box: UnitBox, learner: Learner, state: object, targets: Array) -> Array:
-    units = jax.vmap(lambda x: learner.predict(state, x))(box.x_to_unit(targets))
+    units = jax.vmap(lambda x: learner.answer(state, x))(box.x_to_unit(targets))
     return box.q_from_unit(jnp.clip(units, 0.0, 1.0))
 
 
@@ -137,8 +143,8 @@ def solve(
         q = skill.predict(aim[None])[0]
         allowed = 2 * float(skill.errors.mean()) if tolerance is None else tolerance
         return _judged(skill, q, skill.expected_error(aim), 0, allowed)
-    q, errors = correct(skill.predict, observer(robot), aim[None], looks)
-    return _judged(skill, q[0], float(errors[:, 0].min()), looks, 0.005 if tolerance is None else tolerance)
+    q, errors = skill.reach_for(observer(robot), aim[None], looks)
+    return _judged(skill, q[0], float(errors[-1, 0]), looks, 0.005 if tolerance is None else tolerance)
 
 
 def _judged(skill: Skill, q: np.ndarray, error: float, steps: int, tolerance: float) -> Solution:

@@ -8,8 +8,6 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from jaxtyping import Float
 
-from toddle.reach.solve.correction import correct
-
 Map = Callable[[np.ndarray], np.ndarray]
 
 
@@ -27,36 +25,6 @@ def error_figures(name: str, errors: Float[np.ndarray, " points"]) -> dict[str, 
         f"{name}_p99_mm": float(np.percentile(millimetres, 99)),
         f"{name}_max_mm": float(millimetres.max()),
     }
-
-
-def reach_figures(
-    predict: Map,
-    observe: Map,
-    fixed: Float[np.ndarray, "points space"],
-    seen: Float[np.ndarray, "seen space"],
-    looks: int,
-) -> tuple[dict[str, float], Float[np.ndarray, " points"], Float[np.ndarray, " seen"]]:
-    """How well something reaches.
-
-    Args:
-        predict: targets [m] to joint values.
-        observe: joint values to observed tip positions [m].
-        fixed: the fixed test set [m].
-        seen: test targets that were visited while learning [m].
-        looks: corrections by observation that the closed loop may make.
-
-    Returns:
-        The figures [mm], and the open-loop errors on both sets, point by point [m].
-    """
-    fixed_errors = errors_of(predict, observe, fixed)
-    seen_errors = errors_of(predict, observe, seen)
-    closed = correct(predict, observe, fixed, looks)[1][-1]
-    figures = {
-        **error_figures("fixed_error", fixed_errors),
-        **error_figures("seen_error", seen_errors),
-        **error_figures("closed_loop_error", closed),
-    }
-    return figures, fixed_errors, seen_errors
 
 
 def query_figures(one: Map, many: Map, targets: Float[np.ndarray, "points space"]) -> Mapping[str, float]:

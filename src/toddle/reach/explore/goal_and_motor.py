@@ -5,7 +5,8 @@ the goal, and to the motors that the learner answers for that goal. A line ends 
 
 The text leaves open how E is drawn, from where a line goes on, and says that it ends when "all the motors" saturate.
 Read literally, lines almost never end and the tables cannot be had. The default is the reading that reproduces them:
-E = +-e with a random sign for each component, a line ends at the first saturated motor. `literal` is the other one.
+E = +-e with a random sign for each component, a line ends at the first saturated motor, or where the tip stops moving:
+a learner that has learned "from here, for there, stay" would otherwise stay for good.
 """
 
 from __future__ import annotations
@@ -43,6 +44,7 @@ class GoalAndMotorBabbling(Explorer):
         perturbation: e, the size of each component of E in the unit box (the thesis's best: 0.233).
         ends: a line ends when "any" motor saturates (reproduces the tables), or "all" of them (the text's words).
         draws: components of E are "signs" (+-e), or "uniform" in [-e, e].
+        stall: a line ends too when the tip moves less than this share of what was meant; 0: never.
         restart: a new line starts at the "last" reached position, or at "home".
     """
 
@@ -51,7 +53,6 @@ class GoalAndMotorBabbling(Explorer):
     draws: Literal["signs", "uniform"] = eqx.field(static=True, default="signs")
     restart: Literal["last", "home"] = eqx.field(static=True, default="last")
     stall: float = eqx.field(static=True, default=0.1)
-    follows: Literal["reached", "goal"] = eqx.field(static=True, default="reached")
 
     def init(self, home: Home) -> LineState:
         """The first line begins at home."""
@@ -83,6 +84,4 @@ class GoalAndMotorBabbling(Explorer):
     ) -> tuple[LineState, Float[Array, ""]]:
         """The line goes on from where the tip came to be."""
         stalled = jnp.sum((x - state.position) ** 2) < self.stall**2 * jnp.sum(state.goal_step**2)
-        ended = state.ended | stalled
-        position = x if self.follows == "reached" else jnp.where(ended, x, proposal.goal)
-        return state._replace(position=position, ended=ended), jnp.float32(1.0)
+        return state._replace(position=x, ended=state.ended | stalled), jnp.float32(1.0)

@@ -23,6 +23,10 @@ class Learner(eqx.Module):
     def predict(self, state: State, x: Float[Array, " space"]) -> Float[Array, " joints"]:
         """Joint values for a position; not clipped to the limits."""
 
+    def answer(self, state: State, x: Float[Array, " space"]) -> Float[Array, " joints"]:
+        """Joint values for a target, for who wants to reach it and not to explore."""
+        return self.predict(state, x)
+
     @abstractmethod
     def update(
         self,

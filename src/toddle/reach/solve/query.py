@@ -21,22 +21,28 @@ Query = Callable[[Float[np.ndarray, " space"]], Float[np.ndarray, " joints"]]
 def query_of(skill: Skill) -> Query:
     """The skill's one-shot answer to a single target [m], as joint values within their limits [rad or m]."""
     if isinstance(skill.learner, Perceptron):
-        return _perceptron_query(skill)
+        return _perceptron_query(skill, skill.learner)
     return lambda target: skill.predict(target[None])[0]
 
 
-def _perceptron_query(skill: Skill) -> Query:
-    box = skill.box
+def _perceptron_query(skill: Skill, learner: Perceptron) -> Query:
+    box, margin = skill.box, learner.margin
     low, span = np.asarray(box.joint_lower, float), np.asarray(box.joint_span, float)
+    high, gain = low + span, span / (1 - 2 * margin)
+    offset = low - margin * gain
     state: Any = skill.state
-    *hidden, (last, last_bias) = [(np.asarray(weights, float), np.asarray(bias, float)) for weights, bias in state]
+    layers = state.now if state.mean is None else state.mean
+    *hidden, (last, last_bias) = [(np.asarray(weights, float), np.asarray(bias, float)) for weights, bias in layers]
     scale, shift = 1 / np.asarray(box.space_span, float), np.asarray(box.space_lower, float)
+    if learner.symmetric:
+        scale, shift = 2 * scale, shift + 0.5 / scale
 
     def answer(target: Float[np.ndarray, " space"]) -> Float[np.ndarray, " joints"]:
         x = (target - shift) * scale
         for weights, bias in hidden:
             x = _sigmoid(weights @ x + bias)
-        return low + span * _sigmoid(last @ x + last_bias)
+        q = offset + gain * _sigmoid(last @ x + last_bias)
+        return np.minimum(np.maximum(q, low), high)
 
     return answer
 
