@@ -17,7 +17,7 @@ Damage = Callable[[Path, Path], object]
 """Harms the pair (the JSON, the tensors)."""
 
 
-def forge(pair: tuple[Path, Path], change: Callable[[dict[str, Any], dict[str, np.ndarray]], None]) -> None:
+def forge(pair: tuple[Path, Path], change: Callable[[dict[str, Any], dict[str, np.ndarray]], object]) -> None:
     """Change facts and tensors and make every digest right again, as somebody who wants to be believed would."""
     facts, tensors = pair
     record, arrays = json.loads(facts.read_text()), load(tensors.read_bytes())

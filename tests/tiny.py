@@ -51,4 +51,4 @@ def course(seed: int = 0, samples: int = 400) -> tuple[Cycle, ...]:
 @functools.cache
 def skill(seed: int = 0) -> Skill:
     """What the two-joint planar arm has learned."""
-    return toddle.learn("planar:2", seed=seed, **SIZES)
+    return toddle.learn("planar:2", **{**SIZES, "seed": seed})

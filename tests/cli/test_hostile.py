@@ -232,7 +232,7 @@ TARGETS: dict[tuple[str, ...], str] = {
     ("1m", "0", "1"): "not a number",
     ("0x1", "0", "1"): "not a number",
 }
-ASK = ("--skill", "skill", "--target", "1", "0", "1")
+ASK: tuple[str, ...] = ("--skill", "skill", "--target", "1", "0", "1")
 SETTLED = (
     ("--method", "motor-babbling"), ("--learner", "perceptron"), ("--seed", "1"), ("--hidden", "3"), ("--out", "new"),
     ("--learning-rate", "0.1"), ("--perturbation", "0.1"), ("--test-points", "5"), ("--test-spacing", "0.1"),
@@ -314,7 +314,7 @@ def _folders() -> dict[str, Call]:
 
 
 def _calls() -> dict[str, Call]:
-    calls = {name: ((name,), says) for name, (_, says) in FILES.items()}
+    calls: dict[str, Call] = {name: ((name,), says) for name, (_, says) in FILES.items()}
     calls |= {repr(spec[:20]): ((spec,), says) for spec, says in ROBOTS.items()}
     for flag, values in OPTIONS.items():
         robot = ("arm.urdf", "--test-points=20", "--hidden=4") if flag == "--out" else ("planar:2",)
