@@ -13,7 +13,7 @@ from toddle.failures import unknown_name
 if TYPE_CHECKING:
     from toddle.experiments.experiment import Experiment
 
-NAMES = ("mahboob-hyperparameters",)
+NAMES = ("mahboob-hyperparameters", "mahboob-nicu")
 """The only place to edit to add one: its file has the same name, with underscores, and defines ``EXPERIMENT``."""
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,10 @@ class Task:
     folder: Path
     tell: Callable[[float, str], None]
     stopped: Callable[[], bool]
+
+    def part(self, begins: float, ends: float) -> Task:
+        """The same task for a part of the work, which lies between these shares of the whole."""
+        return replace(self, tell=lambda done, news: self.tell(begins + done * (ends - begins), news))
 
 
 @dataclass(frozen=True)

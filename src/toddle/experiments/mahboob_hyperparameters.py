@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import equinox as eqx
 import jax
@@ -25,6 +25,7 @@ from toddle.experiments.mahboob_tables import Cell, cells
 from toddle.experiments.padded import PaddedPerceptron
 from toddle.experiments.ranks import rank_correlation
 from toddle.reach import loop
+from toddle.reach.api import suited
 from toddle.reach.config import ReachConfig
 from toddle.reach.session import open_session
 from toddle.robots.body import Body
@@ -41,6 +42,7 @@ class Parameters:
         per_cycle: movements between two tests.
         settled: tests at the beginning that don't count.
         seeds: runs of each cell.
+        network: plain, as the document's, or refined.
         hidden: only the cells with these numbers of hidden units; (): all cells.
         widths: sizes that smaller networks are padded to.
         rows: runs side by side in one program.
@@ -53,6 +55,7 @@ class Parameters:
     per_cycle: int = 2_000
     settled: int = 5
     seeds: int = 5
+    network: Literal["plain", "refined"] = "plain"
     hidden: tuple[int, ...] = ()
     widths: tuple[int, ...] = (0, 10, 20, 50, 90, 160)
     rows: int = 50
@@ -95,8 +98,9 @@ class Study:
 
     def errors(self, batch: Batch) -> Float[np.ndarray, "runs cycles"]:
         """Mean error on the fixed test set after each testing cycle of each run [m]."""
-        config = ReachConfig(seed=self.seed, hidden=(batch.width,) if batch.width else ())
-        session = open_session(self.body, config)
+        hidden = (batch.width,) if batch.width else ()
+        config = ReachConfig(seed=self.seed, hidden=hidden, network=self.parameters.network)
+        session = open_session(self.body, suited(config, self.body.name))
         # every batch has the same number of rows, so that batches of a width share one program
         runs = (batch.runs * self.parameters.rows)[: self.parameters.rows]
         members = [self.chosen[cell] for cell, _ in runs]

@@ -7,13 +7,12 @@ learns exactly as one without padding does.
 
 from __future__ import annotations
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from toddle.reach.learn.learner import Learner
-from toddle.reach.learn.perceptron import Layer, Perceptron
+from toddle.reach.learn.perceptron import Layer, Layers, Perceptron
 
 _SILENT = -1e9
 _REHEARSALS = 2000
@@ -30,41 +29,39 @@ class PaddedPerceptron(Learner):
     perceptron: Perceptron
     units: Int[Array, ""]
 
-    def init(
-        self, key: jax.Array, home_x: Float[Array, " space"], home_q: Float[Array, " joints"]
-    ) -> tuple[Layer, ...]:
+    def init(self, key: jax.Array, home_x: Float[Array, " space"], home_q: Float[Array, " joints"]) -> Layers:
         """Silence the padding, then over-fit on home again."""
         state = silence(self.perceptron.init(key, home_x, home_q), self.units)
         rehearse = lambda _, layers: self.update(layers, home_x, home_q, jnp.float32(1.0))  # noqa: E731
         return jax.lax.fori_loop(0, _REHEARSALS, rehearse, state)
 
-    def predict(self, state: tuple[Layer, ...], x: Float[Array, " space"]) -> Float[Array, " joints"]:
-        """Joint values for a position, each in (0, 1)."""
+    def predict(self, state: Layers, x: Float[Array, " space"]) -> Float[Array, " joints"]:
+        """Joint values for a position, from the present weights."""
         return self.perceptron.predict(state, x)
+
+    def answer(self, state: Layers, x: Float[Array, " space"]) -> Float[Array, " joints"]:
+        """Joint values for a position, from the averaged weights where they are kept."""
+        return self.perceptron.answer(state, x)
 
     def update(
         self,
-        state: tuple[Layer, ...],
+        state: Layers,
         x: Float[Array, " space"],
         q: Float[Array, " joints"],
         weight: Float[Array, ""],
-    ) -> tuple[Layer, ...]:
+    ) -> Layers:
         """One step of online back-propagation."""
         return self.perceptron.update(state, x, q, weight)
 
 
-def silence(layers: tuple[Layer, ...], units: Int[Array, ""]) -> tuple[Layer, ...]:
-    """The layers with only the first hidden units awake; a perceptron without hidden layers stays as it is."""
-    if len(layers) == 1:
-        return layers
-    (weights, bias), (out, out_bias) = layers
+def silence(state: Layers, units: Int[Array, ""]) -> Layers:
+    """The state with only the first hidden units awake; a perceptron without hidden layers stays as it is."""
+    if len(state.now) == 1:
+        return state
+    (weights, bias), (out, out_bias) = state.now
     awake = jnp.arange(len(bias)) < units
-    return (
-        (jnp.where(awake[:, None], weights, 0.0), jnp.where(awake, bias, _SILENT)),
-        (jnp.where(awake, out, 0.0), out_bias),
+    now = (
+        Layer(jnp.where(awake[:, None], weights, 0.0), jnp.where(awake, bias, _SILENT)),
+        Layer(jnp.where(awake, out, 0.0), out_bias),
     )
-
-
-def padded(learner: Perceptron, units: Int[Array, ""], learning_rate: Float[Array, ""]) -> PaddedPerceptron:
-    """A perceptron with these units awake, at this learning rate; both may be traced."""
-    return PaddedPerceptron(eqx.tree_at(lambda p: p.learning_rate, learner, learning_rate), units)
+    return Layers(now, None if state.mean is None else now)

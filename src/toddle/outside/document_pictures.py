@@ -90,7 +90,7 @@ def means_and_deviations(
 
 def courses(
     path: Path,
-    lines: Mapping[str, tuple[Sequence[float], Sequence[float]]],
+    lines: Mapping[str, tuple[np.ndarray, np.ndarray]],
     levels: Mapping[str, float],
     *,
     x_label: str,
