@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from toddle.failures import BadInput
+from toddle.failures import BadInput, unknown_name
 
 MOST_SAMPLES = 100_000_000
 
@@ -60,6 +60,9 @@ class ReachConfig:
             _within("hidden", size, 1, 4096)
         if len(self.hidden or ()) > 8:
             raise BadInput(f"{len(self.hidden or ())} layers", where="--hidden", remedy="give 8 or fewer")
+        for name, known in (("network", ("refined", "plain")), ("reading", ("tables", "literal"))):
+            if getattr(self, name) not in known:
+                raise unknown_name(name, str(getattr(self, name)), known, where=_flag(name))
         for name in ("learning_rate", "perturbation", "test_spacing"):
             value = getattr(self, name)
             if value is not None and not (isinstance(value, float | int) and 0 < value <= 100):

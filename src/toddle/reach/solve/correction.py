@@ -79,14 +79,15 @@ def correct(
     q = jax.vmap(answer)(targets)
     x = observe(q)
     attempt = _Attempt(q, x, targets, jax.vmap(slope)(targets))
-    distance = jnp.linalg.norm((x - targets) * scale, axis=-1)
+    edges = jnp.broadcast_to(scale, targets.shape)
+    distance = jnp.linalg.norm((x - targets) * edges, axis=-1)
     best_q, errors = q, [distance]
     for _ in range(looks):
         if method == "newton":
             attempt = _newton(attempt, observe, targets, largest)
         else:
             attempt = _shift(attempt, observe, targets, answer)
-        distance = jnp.linalg.norm((attempt.x - targets) * scale, axis=-1)
+        distance = jnp.linalg.norm((attempt.x - targets) * edges, axis=-1)
         best_q = jnp.where((distance < errors[-1])[:, None], attempt.q, best_q)
         errors.append(jnp.minimum(distance, errors[-1]))
     return Corrected(best_q, jnp.stack(errors))
