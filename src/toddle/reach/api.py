@@ -28,7 +28,7 @@ LOOKS = 3
 class Options(TypedDict, total=False):
     """The keyword arguments of `learn`: the fields of `ReachConfig`."""
 
-    method: str
+    method: str | None
     learner: str | None
     samples: int
     seed: int

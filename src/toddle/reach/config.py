@@ -15,7 +15,7 @@ class ReachConfig:
     """One run of the learning loop. None means "what suits the method and the robot".
 
     Attributes:
-        method: how it explores (see `toddle.reach.methods.METHODS`).
+        method: how it explores (see `toddle.reach.methods.METHODS`); None: what suits the arm (`with_method`).
         learner: what learns from it: perceptron or local-linear.
         samples: how many movements to learn from.
         seed: of all randomness.
@@ -31,7 +31,7 @@ class ReachConfig:
         test_spacing: least distance between its points [m].
     """
 
-    method: str = "goal-and-motor-babbling"
+    method: str | None = None
     learner: str | None = None
     samples: int = 300_000
     seed: int = 0

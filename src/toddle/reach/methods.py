@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
 
 from toddle.failures import BadInput, unknown_name
 from toddle.reach.config import ReachConfig
+from toddle.reach.explore.active import ActiveGoalExploration, ActiveMotorExploration
+from toddle.reach.explore.direction import direction_sampling
 from toddle.reach.explore.explorer import Explorer
+from toddle.reach.explore.goal import GoalBabbling
 from toddle.reach.explore.goal_and_motor import GoalAndMotorBabbling
 from toddle.reach.explore.motor import ContinuousMotorBabbling, MotorBabbling
 from toddle.reach.learn.learner import Learner
+from toddle.reach.learn.local_linear import local_linear_map
 from toddle.reach.learn.perceptron import Perceptron, refined
 from toddle.reach.unit_box import UnitBox
+
+
+_RANDOM_REGION = 0.3  # how often an active method goes to a region at random (Moulin-Frier 2013)
 
 
 @dataclass(frozen=True)
@@ -51,6 +58,28 @@ def _continuous_motor(config: ReachConfig, box: UnitBox) -> Explorer:
     return ContinuousMotorBabbling(jnp.float32(_or(config.perturbation, 0.1)))
 
 
+def _goal(config: ReachConfig, box: UnitBox) -> Explorer:
+    # Rolf's step, 2 cm, is a hundredth of his workspace of 2 m: arms of all sizes take theirs
+    span = float(box.space_span.max())
+    return direction_sampling(box, step=0.01 * span, sigma=_or(config.perturbation, 0.05))
+
+
+def _random_goal(config: ReachConfig, box: UnitBox) -> Explorer:
+    return GoalBabbling(jnp.float32(_or(config.perturbation, 0.05)))
+
+
+def _active_goal(config: ReachConfig, box: UnitBox) -> Explorer:
+    return ActiveGoalExploration(jnp.float32(_or(config.perturbation, 0.05)), jnp.float32(_RANDOM_REGION))
+
+
+def _active_motor(config: ReachConfig, box: UnitBox) -> Explorer:
+    return ActiveMotorExploration(jnp.float32(_RANDOM_REGION))
+
+
+def _local_linear(config: ReachConfig, box: UnitBox, hidden: tuple[int, ...]) -> Learner:
+    return local_linear_map(len(box.space_span), learning_rate=_or(config.learning_rate, 0.1))
+
+
 def _perceptron(config: ReachConfig, box: UnitBox, hidden: tuple[int, ...]) -> Learner:
     layers = hidden if config.hidden is None else config.hidden
     rate = jnp.float32(_or(config.learning_rate, 0.717))
@@ -63,6 +92,34 @@ _METHODS = (
         "lines in goal space, each with a perturbation of goal and motors",
         "Mahboob 2015, algorithm 1",
         _goal_and_motor,
+        "perceptron",
+    ),
+    Method(
+        "goal-babbling",
+        "goals along lines, with a slowly changing perturbation; the arm goes home now and then",
+        "Rolf 2013, direction sampling",
+        _goal,
+        "local-linear",
+    ),
+    Method(
+        "random-goal-babbling",
+        "goals at random, with a perturbation of the motors",
+        "Moulin-Frier 2013, random goal",
+        _random_goal,
+        "local-linear",
+    ),
+    Method(
+        "active-goal",
+        "goals where the error is changing fastest",
+        "Moulin-Frier 2013, active goal",
+        _active_goal,
+        "local-linear",
+    ),
+    Method(
+        "active-motor",
+        "joint values where the error is changing fastest",
+        "Moulin-Frier 2013, active motor",
+        _active_motor,
         "perceptron",
     ),
     Method(
@@ -84,17 +141,34 @@ _METHODS = (
 METHODS: Mapping[str, Method] = {method.name: method for method in _METHODS}
 LEARNERS: Mapping[str, Callable[[ReachConfig, UnitBox, tuple[int, ...]], Learner]] = {
     "perceptron": _perceptron,
+    "local-linear": _local_linear,
 }
 
 
-def method_named(name: str) -> Method:
+def with_method(config: ReachConfig, joints: int, space: int) -> ReachConfig:
+    """The configuration with a method, where it names none.
+
+    With one joint to spare at most, goal and motor babbling learns quickest. With more, postures that it visits for one
+    position differ so much that their mean is none of them; goal babbling keeps to one way of reaching.
+
+    Args:
+        config: the run's configuration.
+        joints: how many joints the arm has.
+        space: how many coordinates its tip has.
+    """
+    if config.method is not None:
+        return config
+    return replace(config, method="goal-and-motor-babbling" if joints <= space + 1 else "goal-babbling")
+
+
+def method_named(name: str | None) -> Method:
     """The method of this name.
 
     Raises:
         BadInput: there is none; the nearest are named.
     """
     if name not in METHODS:
-        raise unknown_name("method", name, METHODS, where="--method")
+        raise unknown_name("method", str(name), METHODS, where="--method")
     return METHODS[name]
 
 

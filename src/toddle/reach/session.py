@@ -21,7 +21,7 @@ from toddle.reach.config import ReachConfig
 from toddle.reach.evaluate.seen import cell_of, cells_per_axis
 from toddle.reach.evaluate.targets import fixed_targets
 from toddle.reach.explore.explorer import Home
-from toddle.reach.methods import make_explorer, make_learner, needs_equal_scales
+from toddle.reach.methods import make_explorer, make_learner, needs_equal_scales, with_method
 from toddle.reach.observe import observer
 from toddle.reach.unit_box import around, sample_reachable
 from toddle.robots.body import Body, Plant
@@ -77,7 +77,7 @@ def open_session(
 
     Args:
         body: the body or plant that will move.
-        config: what to run.
+        config: what to run; where it names no method, the one that suits the body is taken.
         hidden: hidden layers that suit the robot, for where the configuration names none.
         survey: the kinematics of a plant, where known: its workspace is then surveyed without a movement.
 
@@ -86,6 +86,7 @@ def open_session(
     """
     surveyed = survey if survey is not None else body
     positions = _survey(surveyed, config.seed)
+    config = with_method(config, len(body.joints), positions.shape[1])
     lower, upper = np.asarray(body.lower), np.asarray(body.upper)
     box = around(lower, upper, positions, isotropic=needs_equal_scales(config))
     home = jnp.asarray(body.home, jnp.float32)
