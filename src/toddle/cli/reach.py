@@ -39,7 +39,7 @@ class Reach:
 
     Attributes:
         robot: a name (nicu, suralp, icub_arm, planar:7, planar3, scara, bha), or the path of a URDF or MJCF file.
-        method: how it explores.
+        method: how it explores; what suits the arm unless given.
         learner: what learns from it: perceptron or local-linear; the method's own unless given.
         samples: movements to learn from; 300000 unless given, 5000 in physics.
         seed: of all randomness.
@@ -154,7 +154,7 @@ def _check_mode(asked: Reach) -> None:
 def _learn(asked: Reach) -> int:
     from toddle.reach.api import suited
     from toddle.reach.config import ReachConfig
-    from toddle.reach.methods import learner_named
+    from toddle.reach.methods import learner_named, with_method
     from toddle.robots.catalogue import Choice
 
     given = {name: getattr(asked, name) for name in _OF_A_RUN if getattr(asked, name) is not None}
@@ -164,7 +164,7 @@ def _learn(asked: Reach) -> int:
     if given.get("hidden") == (0,):
         given["hidden"] = ()
     config = ReachConfig(**given)
-    learner_named(config)
+    learner_named(with_method(config, 0, 0))
     source = Choice(asked.robot or "", asked.tip, asked.base, asked.joints)
     how = _how(asked)
     _refuse_used(asked.out)

@@ -20,7 +20,6 @@ from toddle.reach.learn.local_linear import local_linear_map
 from toddle.reach.learn.perceptron import Perceptron, refined
 from toddle.reach.unit_box import UnitBox
 
-
 _RANDOM_REGION = 0.3  # how often an active method goes to a region at random (Moulin-Frier 2013)
 
 
@@ -146,7 +145,7 @@ LEARNERS: Mapping[str, Callable[[ReachConfig, UnitBox, tuple[int, ...]], Learner
 
 
 def with_method(config: ReachConfig, joints: int, space: int) -> ReachConfig:
-    """The configuration with a method, where it names none.
+    """The configuration with a method, where it names none; and with the perceptron, where it names hidden layers.
 
     With one joint to spare at most, goal and motor babbling learns quickest. With more, postures that it visits for one
     position differ so much that their mean is none of them; goal babbling keeps to one way of reaching.
@@ -156,6 +155,8 @@ def with_method(config: ReachConfig, joints: int, space: int) -> ReachConfig:
         joints: how many joints the arm has.
         space: how many coordinates its tip has.
     """
+    if config.learner is None and config.hidden is not None:
+        config = replace(config, learner="perceptron")
     if config.method is not None:
         return config
     return replace(config, method="goal-and-motor-babbling" if joints <= space + 1 else "goal-babbling")
@@ -167,7 +168,7 @@ def method_named(name: str | None) -> Method:
     Raises:
         BadInput: there is none; the nearest are named.
     """
-    if name not in METHODS:
+    if name is None or name not in METHODS:
         raise unknown_name("method", str(name), METHODS, where="--method")
     return METHODS[name]
 
