@@ -13,7 +13,14 @@ from toddle.failures import unknown_name
 if TYPE_CHECKING:
     from toddle.experiments.experiment import Experiment
 
-NAMES = ("mahboob-hyperparameters", "mahboob-nicu")
+NAMES = (
+    "mahboob-hyperparameters",
+    "mahboob-nicu",
+    "mahboob-slp-mlp",
+    "mahboob-suralp",
+    "mahboob-planar5",
+    "rolf-direction-sampling",
+)
 """The only place to edit to add one: its file has the same name, with underscores, and defines ``EXPERIMENT``."""
 
 

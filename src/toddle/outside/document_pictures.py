@@ -107,3 +107,17 @@ def courses(
     axes.set(xlabel=x_label, ylabel=y_label, title=title, ylim=(0, None))
     axes.legend(frameon=False)
     save_figure(figure, path)
+
+
+def discovery(path: Path, positions: Mapping[str, Float[np.ndarray, "_ space"]], *, title: str) -> None:
+    """Visited positions in the plane [m], a panel each, the base in red (figures A.5 to A.8 of Mahboob 2015)."""
+    figure = new_figure(3.0 * max(len(positions), 1), 3.4)
+    for k, (name, visited) in enumerate(positions.items()):
+        axes = plain_axes(figure, 101 + 10 * len(positions) + k)
+        axes.scatter(*visited.T, s=1, color=OURS, alpha=0.5, linewidths=0)
+        axes.scatter(0, 0, s=25, color=THEIRS)
+        axes.set_aspect("equal")
+        axes.set(xlim=(-1.05, 1.05), ylim=(-1.05, 1.05), xlabel="x [m]")
+        axes.set_title(name, fontsize=8)
+    figure.suptitle(title, fontsize=10)
+    save_figure(figure, path)
