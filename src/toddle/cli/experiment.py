@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 import sys
 import time
 from collections.abc import Sequence
@@ -59,8 +58,7 @@ def main(argv: Sequence[str]) -> int:
     experiment = experiment_named(asked.name)
     folder = _new_folder(asked.out, asked.name)
     outcome, stopped, seconds = _run(experiment, asked, folder)
-    command = shlex.join(["toddle", "experiment", *argv])
-    record = _record(experiment, outcome, asked, command, stopped, seconds)
+    record = _record(experiment, outcome, asked, stopped, seconds)
     write_json(folder / "figures.json", record)
     _tell(experiment, outcome, record, asked, folder)
     if stopped:
@@ -110,9 +108,7 @@ def _run(experiment: Experiment, asked: Ask, folder: Path) -> tuple[Outcome, boo
         return outcome, stop.asked, time.perf_counter() - began
 
 
-def _record(
-    experiment: Experiment, outcome: Outcome, asked: Ask, command: str, stopped: bool, seconds: float
-) -> dict[str, Any]:
+def _record(experiment: Experiment, outcome: Outcome, asked: Ask, stopped: bool, seconds: float) -> dict[str, Any]:
     """Everything that a reader needs to judge the figures or to make them again."""
     from toddle.outside.machine import machine_in_words
     from toddle.outside.versions import versions
@@ -123,7 +119,7 @@ def _record(
         "verdict": outcome.verdict,
         "holds": outcome.holds,
         "stopped_early": stopped,
-        "command": command,
+        "command": _command(asked),
         "seed": asked.seed,
         "parameters": asdict(outcome.parameters),
         "rows": [asdict(row) for row in outcome.rows],
@@ -132,6 +128,12 @@ def _record(
         "machine": machine_in_words(),
         "versions": versions(),
     }
+
+
+def _command(asked: Ask) -> str:
+    """The call that makes the same figures again."""
+    words = ["toddle", "experiment", str(asked.name), "--full" if asked.full else "--quick", "--seed", str(asked.seed)]
+    return " ".join(words + (["--seeds", str(asked.seeds)] if asked.seeds is not None else []))
 
 
 def _tell(experiment: Experiment, outcome: Outcome, record: dict[str, Any], asked: Ask, folder: Path) -> None:

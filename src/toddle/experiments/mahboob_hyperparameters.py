@@ -31,6 +31,8 @@ from toddle.reach.session import open_session
 from toddle.robots.body import Body
 from toddle.robots.catalogue import load
 
+METHOD = "goal-and-motor-babbling"
+
 
 @dataclass(frozen=True)
 class Parameters:
@@ -99,7 +101,7 @@ class Study:
     def errors(self, batch: Batch) -> Float[np.ndarray, "runs cycles"]:
         """Mean error on the fixed test set after each testing cycle of each run [m]."""
         hidden = (batch.width,) if batch.width else ()
-        config = ReachConfig(seed=self.seed, hidden=hidden, network=self.parameters.network)
+        config = ReachConfig(method=METHOD, seed=self.seed, hidden=hidden, network=self.parameters.network)
         session = open_session(self.body, suited(config, self.body.name))
         # every batch has the same number of rows, so that batches of a width share one program
         runs = (batch.runs * self.parameters.rows)[: self.parameters.rows]

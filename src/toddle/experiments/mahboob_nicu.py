@@ -21,6 +21,8 @@ from toddle.experiments.experiment import Experiment, Outcome, Row, Task
 from toddle.experiments.families import Family, errors_point_by_point, learn_family, open_for
 from toddle.reach.config import ReachConfig
 
+METHOD = "goal-and-motor-babbling"
+
 
 @dataclass(frozen=True)
 class Parameters:
@@ -70,7 +72,8 @@ def run(task: Task) -> Outcome:
     parameters = FULL if task.full else QUICK
     parameters, document = replace(parameters, seeds=task.seeds or parameters.seeds), Printed()
     ours = ReachConfig(
-        hidden=parameters.hidden, learning_rate=parameters.learning_rate, perturbation=parameters.perturbation,
+        method=METHOD, hidden=parameters.hidden, learning_rate=parameters.learning_rate,
+        perturbation=parameters.perturbation,
         samples=parameters.movements, per_cycle=parameters.per_cycle, seed=task.seed,
     )  # fmt: skip
     plain = replace(ours, network="plain")

@@ -24,6 +24,8 @@ from toddle.reach.config import ReachConfig
 from toddle.reach.session import open_session
 from toddle.robots.planar import planar
 
+METHOD = "goal-and-motor-babbling"
+
 
 @dataclass(frozen=True)
 class Parameters:
@@ -44,7 +46,7 @@ class Parameters:
     hidden: tuple[int, ...] = (100, 100)
     learning_rate: float = 0.717
     perturbation: float = 0.233
-    network: Literal["plain", "refined"] = "refined"
+    network: Literal["plain", "refined"] = "plain"
     movements: int = 600_000
     per_cycle: int = 1_000
     seeds: int = 2
@@ -63,7 +65,8 @@ def run(task: Task) -> Outcome:
     parameters = FULL if task.full else QUICK
     parameters = replace(parameters, seeds=task.seeds or parameters.seeds)
     config = ReachConfig(
-        hidden=parameters.hidden, learning_rate=parameters.learning_rate, perturbation=parameters.perturbation,
+        method=METHOD, hidden=parameters.hidden, learning_rate=parameters.learning_rate,
+        perturbation=parameters.perturbation,
         samples=parameters.movements, per_cycle=parameters.per_cycle, seed=task.seed, network=parameters.network,
     )  # fmt: skip
     families: dict[float, Family] = {}

@@ -21,6 +21,9 @@ from toddle.reach.config import ReachConfig
 LINES_A_TEST = 200  # of the document
 
 
+METHOD = "goal-and-motor-babbling"
+
+
 @dataclass(frozen=True)
 class Parameters:
     """Of the experiment.
@@ -65,7 +68,8 @@ def run(task: Task) -> Outcome:
     parameters = FULL if task.full else QUICK
     parameters, document = replace(parameters, seeds=task.seeds or parameters.seeds), Printed()
     config = ReachConfig(
-        hidden=parameters.hidden, learning_rate=parameters.learning_rate, perturbation=parameters.perturbation,
+        method=METHOD, hidden=parameters.hidden, learning_rate=parameters.learning_rate,
+        perturbation=parameters.perturbation,
         samples=parameters.movements, per_cycle=parameters.per_cycle, seed=task.seed, network=parameters.network,
     )  # fmt: skip
     mlp = learn_family(open_for(parameters.robot, config), parameters.seeds, task.part(0.0, 0.6))

@@ -16,6 +16,8 @@ from toddle.experiments.experiment import Experiment, Outcome, Row, Task
 from toddle.experiments.families import Family, learn_family, open_for
 from toddle.reach.config import ReachConfig
 
+METHOD = "goal-and-motor-babbling"
+
 
 @dataclass(frozen=True)
 class Parameters:
@@ -57,7 +59,8 @@ def run(task: Task) -> Outcome:
     parameters = FULL if task.full else QUICK
     parameters, document = replace(parameters, seeds=task.seeds or parameters.seeds), Printed()
     refined = ReachConfig(
-        hidden=parameters.hidden, learning_rate=parameters.learning_rate, perturbation=parameters.perturbation,
+        method=METHOD, hidden=parameters.hidden, learning_rate=parameters.learning_rate,
+        perturbation=parameters.perturbation,
         samples=parameters.movements, per_cycle=parameters.per_cycle, seed=task.seed,
     )  # fmt: skip
     plain = replace(refined, network="plain")

@@ -1,9 +1,9 @@
 """Goal babbling with direction sampling on planar arms of 5, 20 and 50 joints (Rolf 2013; Rolf, Steil, Gienger 2011).
 
-A local linear map learns from goals along lines in random directions, with rate 0.1 and perturbations that change slowly.
-Mahboob 2015 (4.1) reports of Rolf's experiment that "the approach works well enough for 5 DOF as well as 50 DOF" and
-converges after "almost 1.000.000 examples"; the arms are one metre long. The papers' figures are curves: no number is
-printed that could stand beside ours, so ours stand beside what we ask of them.
+A local linear map learns from goals along lines in random directions, with rate 0.1 and perturbations that change
+slowly. Mahboob 2015 (4.1) reports of Rolf's experiment that "the approach works well enough for 5 DOF as well as 50
+DOF" and converges after "almost 1.000.000 examples"; the arms are one metre long. The papers' figures are curves: no
+number is printed that could stand beside ours, so ours stand beside what we ask of them.
 """
 
 from __future__ import annotations
