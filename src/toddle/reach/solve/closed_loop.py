@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -41,5 +42,5 @@ def reach_for(
         return box.x_to_unit(jnp.asarray(observe(np.asarray(box.q_from_unit(q), float)), jnp.float32))
 
     units = box.x_to_unit(jnp.asarray(targets, jnp.float32))
-    best = correct(lambda x: learner.answer(state, x), seen, units, looks, scale=box.space_span)
+    best = correct(eqx.Partial(learner.answer, state), seen, units, looks, scale=box.space_span)
     return np.asarray(box.q_from_unit(best.q), float), np.asarray(best.errors, float)

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -34,6 +35,13 @@ class Corrected(NamedTuple):
 
     q: Float[Array, "points joints"]
     errors: Float[Array, "answers points"]
+
+
+class _Best(NamedTuple):
+    """For each target the best movement so far, and its distance."""
+
+    q: Float[Array, "points joints"]
+    error: Float[Array, " points"]
 
 
 class _Attempt(NamedTuple):
@@ -74,40 +82,69 @@ def correct(
     """
     if looks < 0:
         raise BadInput(f"{looks} looks", remedy="give 0 (open loop) or more")
-    answer = lambda x: jnp.clip(predict(x), 0.0, 1.0)  # noqa: E731
-    slope = jax.jacfwd(predict) if method == "newton" else lambda x: jnp.zeros((0, len(x)))
-    q = jax.vmap(answer)(targets)
-    x = observe(q)
-    attempt = _Attempt(q, x, targets, jax.vmap(slope)(targets))
     edges = jnp.broadcast_to(scale, targets.shape)
-    distance = jnp.linalg.norm((x - targets) * edges, axis=-1)
-    best_q, errors = q, [distance]
+    q, slope = _begin(predict, targets, method == "newton")
+    attempt = _Attempt(q, observe(q), targets, slope)
+    best = _Best(q, _distance(attempt.x, targets, edges))
+    errors = [best.error]
     for _ in range(looks):
         if method == "newton":
             attempt = _newton(attempt, observe, targets, largest)
         else:
-            attempt = _shift(attempt, observe, targets, answer)
-        distance = jnp.linalg.norm((attempt.x - targets) * edges, axis=-1)
-        best_q = jnp.where((distance < errors[-1])[:, None], attempt.q, best_q)
-        errors.append(jnp.minimum(distance, errors[-1]))
-    return Corrected(best_q, jnp.stack(errors))
+            attempt = _shift(attempt, observe, targets, predict)
+        best = _better(best, attempt, targets, edges)
+        errors.append(best.error)
+    return Corrected(best.q, jnp.stack(errors))
 
 
-def _shift(attempt: _Attempt, observe: Observe, targets: Array, answer: Predict) -> _Attempt:
+@eqx.filter_jit
+def _begin(predict: Predict, targets: Array, newton: bool) -> tuple[Array, Array]:
+    """The open-loop answers, and the slope of the estimate there."""
+    slope = jax.jacfwd(predict) if newton else lambda x: jnp.zeros((0, len(x)))
+    return _answers(predict, targets), jax.vmap(slope)(targets)
+
+
+@eqx.filter_jit
+def _answers(predict: Predict, targets: Array) -> Array:
+    return jnp.clip(jax.vmap(predict)(targets), 0.0, 1.0)
+
+
+@jax.jit
+def _distance(x: Array, targets: Array, edges: Array) -> Array:
+    return jnp.linalg.norm((x - targets) * edges, axis=-1)
+
+
+@jax.jit
+def _better(best: _Best, attempt: _Attempt, targets: Array, edges: Array) -> _Best:
+    distance = _distance(attempt.x, targets, edges)
+    q = jnp.where((distance < best.error)[:, None], attempt.q, best.q)
+    return _Best(q, jnp.minimum(distance, best.error))
+
+
+def _shift(attempt: _Attempt, observe: Observe, targets: Array, predict: Predict) -> _Attempt:
     """One movement with the commanded target shifted by what was missed."""
     command = attempt.command + targets - attempt.x
-    q = jax.vmap(answer)(command)
+    q = _answers(predict, command)
     return attempt._replace(q=q, x=observe(q), command=command)
 
 
 def _newton(attempt: _Attempt, observe: Observe, targets: Array, largest: float) -> _Attempt:
     """One movement with the joints moved by the slope times what was missed; the slope learns from the outcome."""
+    q = _stepped(attempt, targets, largest)
+    x = observe(q)
+    return attempt._replace(q=q, x=x, slope=_mended(attempt, q, x))
+
+
+@jax.jit
+def _stepped(attempt: _Attempt, targets: Array, largest: float) -> Array:
     step = jnp.einsum("pjs,ps->pj", attempt.slope, targets - attempt.x)
     step = step * jnp.minimum(1.0, largest / jnp.maximum(jnp.max(jnp.abs(step), axis=1, keepdims=True), 1e-12))
-    q = jnp.clip(attempt.q + step, 0.0, 1.0)
-    x = observe(q)
-    slope = jax.vmap(_broyden)(attempt.slope, q - attempt.q, x - attempt.x)
-    return attempt._replace(q=q, x=x, slope=slope)
+    return jnp.clip(attempt.q + step, 0.0, 1.0)
+
+
+@jax.jit
+def _mended(attempt: _Attempt, q: Array, x: Array) -> Array:
+    return jax.vmap(_broyden)(attempt.slope, q - attempt.q, x - attempt.x)
 
 
 def _broyden(
