@@ -52,3 +52,9 @@ def course(seed: int = 0, samples: int = 400) -> tuple[Cycle, ...]:
 def skill(seed: int = 0) -> Skill:
     """What the two-joint planar arm has learned."""
     return toddle.learn("planar:2", **{**SIZES, "seed": seed})
+
+
+@functools.cache
+def plain_skill() -> Skill:
+    """The same by the thesis's own network."""
+    return toddle.learn("planar:2", **{**SIZES, "network": "plain"})

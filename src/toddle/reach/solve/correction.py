@@ -135,7 +135,7 @@ def _newton(attempt: _Attempt, observe: Observe, targets: Array, largest: float)
     return attempt._replace(q=q, x=x, slope=_mended(attempt, q, x))
 
 
-@jax.jit
+@eqx.filter_jit
 def _stepped(attempt: _Attempt, targets: Array, largest: float) -> Array:
     step = jnp.einsum("pjs,ps->pj", attempt.slope, targets - attempt.x)
     step = step * jnp.minimum(1.0, largest / jnp.maximum(jnp.max(jnp.abs(step), axis=1, keepdims=True), 1e-12))
