@@ -70,7 +70,7 @@ class LocalLinearMap(Learner):
 
     def predict(self, state: LocalLinearState, x: Float[Array, " space"]) -> Float[Array, " joints"]:
         """Joint values for a position; not clipped to the limits."""
-        features, rows, _ = self._features(state, x)
+        features, rows = self._features(state, x)
         return jnp.einsum("kf,kfj->j", features, state.pieces[rows])
 
     def update(
@@ -82,31 +82,34 @@ class LocalLinearMap(Learner):
     ) -> LocalLinearState:
         """A new piece if x is far from all others, then one step of gradient descent."""
         state = self._grow(state, x)
-        features, rows, _ = self._features(state, x)
+        features, rows = self._features(state, x)
         error = q - jnp.einsum("kf,kfj->j", features, state.pieces[rows])
-        step = self.learning_rate * weight * features[:, :, None] * error[None, None, :]
+        # beyond all prototypes (they may be used up) features are large, and a full step would overshoot
+        rate = self.learning_rate * weight / jnp.maximum(1.0, jnp.sum(features**2) / 2)
+        step = rate * features[:, :, None] * error[None, None, :]
         return state._replace(pieces=state.pieces.at[rows].add(step, unique_indices=True))
 
     def _features(
         self, state: LocalLinearState, x: Float[Array, " space"]
-    ) -> tuple[Float[Array, "near features"], Int[Array, " near"], Float[Array, ""]]:
-        """phi of the nearest prototypes, which they are, and the squared distance to the nearest [d^2]."""
-        offset = (x - state.prototypes) / self.radius
+    ) -> tuple[Float[Array, "near features"], Int[Array, " near"]]:
+        """phi of the nearest prototypes, and which they are."""
+        offset = (x[None] - state.prototypes) / self.radius
         nearness, rows = jax.lax.top_k(-jnp.sum(offset**2, axis=-1), min(self.neighbours, self.capacity))
-        local = (x - state.prototypes[rows]) / self.radius
-        ones = jnp.ones((len(rows), 1))
-        return jax.nn.softmax(nearness)[:, None] * jnp.concatenate([local, ones], axis=1), rows, -nearness[0]
+        local = jnp.concatenate([offset[rows], jnp.ones((len(rows), 1))], axis=1)
+        return jax.nn.softmax(nearness)[:, None] * local, rows
 
     def _grow(self, state: LocalLinearState, x: Float[Array, " space"]) -> LocalLinearState:
         """A new prototype at x if all others are at least d away: o = g(x), M = d dg/dx."""
-        distance = jnp.min(jnp.sum((x - state.prototypes) ** 2, axis=-1))
+        distance = jnp.min(jnp.sum((x[None] - state.prototypes) ** 2, axis=-1))
         grows = (distance >= self.radius**2) & (state.used < self.capacity)
         row = jnp.minimum(state.used, self.capacity - 1)
-        # Only one row passes through the condition, so that the tables are never copied.
+        # only one row passes through the condition, so that the tables are never copied
         piece = jax.lax.cond(grows, lambda: self._tangent(state, x), lambda: state.pieces[row])
         place = jnp.where(grows, x, state.prototypes[row])
         return LocalLinearState(
-            state.prototypes.at[row].set(place), state.pieces.at[row].set(piece), state.used + grows
+            state.prototypes.at[row].set(place),
+            state.pieces.at[row].set(piece),
+            state.used + grows.astype(jnp.int32),
         )
 
     def _tangent(self, state: LocalLinearState, x: Float[Array, " space"]) -> Float[Array, "features joints"]:
@@ -133,8 +136,6 @@ def local_linear_map(
     for what, value in (("radius", radius), ("learning rate", learning_rate)):
         if not 0 < value <= 1:
             raise BadInput(f"the {what} is {value}", remedy="give a number above 0, at most 1")
-    # Discs of diameter d, placed at random until none fits, fill about 0.55 of the plane, balls 0.38 of space; an
-    # arm's workspace fills about 0.8 of its box. The bound below is about that of a full box and 1.4 cells around.
-    per_side = 1 / radius + 1
-    capacity = min(_MOST, max(neighbours, int(0.75 * per_side**space)))
+    # points placed at random, d apart until none fits, come to about 0.7 in a cell of d x d (or d x d x d)
+    capacity = min(_MOST, max(neighbours, int(0.75 * (1 / radius + 1) ** space)))
     return LocalLinearMap(jnp.float32(radius), jnp.float32(learning_rate), capacity, neighbours)
