@@ -48,7 +48,9 @@ def test_a_wrong_name_is_answered_with_the_nearest():
 
 
 def test_naming_the_experiments_imports_nothing_heavy():
-    code = "import sys, toddle.experiments, toddle.cli.experiment; print(sorted({'jax', 'matplotlib'} & set(sys.modules)))"
+    code = (
+        "import sys, toddle.experiments, toddle.cli.experiment; print(sorted({'jax', 'matplotlib'} & set(sys.modules)))"
+    )
     asked = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert asked.stdout.strip() == "[]"
 

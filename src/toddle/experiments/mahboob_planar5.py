@@ -56,7 +56,7 @@ class Parameters:
 
 FULL = Parameters()
 QUICK = replace(FULL, movements=100_000, seeds=1, limits_deg=(90.0, 45.0), discovery=(1_000, 10_000, 100_000))
-SETTLES = (250_000, 300_000)  # movements, section A.1.2
+SETTLES = (250e3, 300e3)  # movements, section A.1.2
 MAJOR_BY = 10_000  # movements, section A.1.3
 
 

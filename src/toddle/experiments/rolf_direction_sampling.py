@@ -43,7 +43,7 @@ class Parameters:
 
 FULL = Parameters()
 QUICK = replace(FULL, joints=(5, 20), movements=60_000, per_cycle=2_000, seeds=1)
-DOCUMENT_CONVERGES = 1_000_000  # movements, Mahboob 2015, section 4.1
+DOCUMENT_CONVERGES = 1e6  # movements, Mahboob 2015, section 4.1
 
 
 def run(task: Task) -> Outcome:
