@@ -85,7 +85,7 @@ def choose(interest: Interest, choice: Choice, explore: Float[Array, ""]) -> Flo
     """A point, uniform in a region chosen by interest; with probability `explore` in any region."""
     # a region whose window is not full yet is as interesting as the known ones are on average
     known = interest.entries >= interest.errors.shape[1]
-    average = jnp.sum(interest.progress) / jnp.maximum(jnp.sum(known), 1)
+    average = jnp.sum(interest.progress) / jnp.maximum(jnp.sum(known.astype(jnp.float32)), 1.0)
     weight = jnp.where(known, interest.progress, average) + 1e-12
     by_interest = jnp.cumsum(weight) / jnp.sum(weight)
     regions = len(weight)
@@ -94,7 +94,7 @@ def choose(interest: Interest, choice: Choice, explore: Float[Array, ""]) -> Flo
     region = jnp.minimum(jnp.where(choice.uniform < explore, anyone, chosen), regions - 1)
     cut, parts = grid(len(choice.place))
     index = region // jnp.array([parts**axis for axis in range(cut)]) % parts
-    return choice.place.at[:cut].set((index + choice.place[:cut]) / parts)
+    return choice.place.at[:cut].set((index.astype(jnp.float32) + choice.place[:cut]) / parts)
 
 
 class ActiveGoalExploration(Explorer):

@@ -5,19 +5,21 @@ that changes slowly: q = g(x*) + E(x*), E(x) = A x + b. Each sample is weighted 
 meant to go, w_dir = (1 + cos angle(dx, dx*)) / 2, and by how much it moved for the effort, w_eff = min(1, |dx| / |dq|).
 
 A line ends at the boundary of what can be reached: where the tip moves against the line, or less than a tenth of what
-was asked for (an arm that is clipped at its limits stands still, and never moves against anything). The next line starts
-where the tip came to be; sometimes the arm first moves home, along a straight line in joint space.
+was asked for (an arm that is clipped at its limits stands still, and never moves against anything). The next line
+starts where the tip came to be; sometimes the arm first moves home, along a straight line in joint space. A home that
+is bent to one side, and many ways home, keep the arm to one way of reaching where it has several.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
+from toddle.failures import BadInput
 from toddle.reach.explore.explorer import Explorer, Home, Predict, Proposal
 from toddle.reach.unit_box import UnitBox
 
@@ -49,7 +51,7 @@ class Walk(NamedTuple):
 
 
 class WalkNoise(NamedTuple):
-    """Standard normal steps of A and b, a direction of length 1, and a number from 0 to 1 that decides on going home."""
+    """Standard normal steps of A and b, a direction of length 1, a number from 0 to 1 that decides on going home."""
 
     linear: Float[Array, "*count joints space"]
     constant: Float[Array, "*count joints"]
@@ -160,12 +162,21 @@ def direction_sampling(
     """Direction sampling with Rolf's parameters for an arm of about one metre.
 
     Args:
-        box: the body's unit box, of one scale for all axes of space.
+        box: the body's unit box, of one scale for all axes of space (`around(..., isotropic=True)`).
         step: distance of one goal from the next [m].
         sigma: size of the perturbation [rad]; it changes by a tenth of this each movement.
         p_home: probability that the arm moves home at a line's end.
         home_step: the most that a joint turns in one movement on the way home [rad].
         stall: a line ends where the tip makes less than this fraction of the step.
+
+    Raises:
+        BadInput: a length or an angle is not positive, or a probability or fraction not in [0, 1].
     """
+    for what, value in (("step", step), ("size of the perturbation", sigma), ("step home", home_step)):
+        if not 0 < value < math.inf:
+            raise BadInput(f"the {what} is {value}", remedy="give a positive number")
+    for what, value in (("probability of going home", p_home), ("stall", stall)):
+        if not 0 <= value <= 1:
+            raise BadInput(f"the {what} is {value}", remedy="give a number from 0 to 1")
     as_array = lambda value: jnp.float32(value)  # noqa: E731
     return DirectionSampling(box, *(as_array(value) for value in (step, sigma, 0.1 * sigma, p_home, home_step, stall)))
