@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
+import jaxtyping
+import pytest
 from hypothesis import settings
 from jaxtyping import install_import_hook
 
@@ -22,3 +25,11 @@ install_import_hook("toddle", "beartype.beartype")
 
 settings.register_profile("toddle", derandomize=True, deadline=None, max_examples=25, print_blob=True)
 settings.load_profile("toddle")
+
+
+@pytest.fixture
+def unchecked() -> Iterator[None]:
+    """As a user has it: no types are enforced, so toddle itself must refuse what is wrong."""
+    jaxtyping.config.update("jaxtyping_disable", True)
+    yield
+    jaxtyping.config.update("jaxtyping_disable", False)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import functools
 from dataclasses import replace
 
+import jax
 import numpy as np
 
 import toddle
 from toddle.reach.api import Options
 from toddle.reach.config import ReachConfig
+from toddle.reach.methods import make_learner
 from toddle.reach.session import Cycle, Session, cycles, open_session, start
 from toddle.reach.skill import Skill
 from toddle.robots.planar import planar
@@ -58,3 +60,14 @@ def skill(seed: int = 0) -> Skill:
 def plain_skill() -> Skill:
     """The same by the thesis's own network."""
     return toddle.learn("planar:2", **{**SIZES, "network": "plain"})
+
+
+@functools.cache
+def local_linear_skill() -> Skill:
+    """A skill that is a local linear map, as it is before it has learned anything."""
+    config = ReachConfig(learner="local-linear", samples=400)
+    opened = session()
+    learner = make_learner(config, opened.setting.box, ())
+    home = opened.setting.home
+    state = learner.init(jax.random.key(0), home.x, home.q)
+    return replace(skill(), config=config, hidden=(), learner=learner, state=state)

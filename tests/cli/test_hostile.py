@@ -418,6 +418,7 @@ def test_there_are_two_hundred_and_more() -> None:
     assert len(CALLS) >= 200
 
 
+@pytest.mark.usefixtures("unchecked")
 @pytest.mark.parametrize("name", CALLS)
 def test_a_hostile_call_is_answered_by_one_line(
     name: str, place: Place, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
-import jaxtyping
 import numpy as np
 import pytest
 import tiny
@@ -109,14 +107,6 @@ def test_out_of_reach_is_said_with_the_nearest_place_that_was_visited() -> None:
     assert " ".join(f"{value:.3f}" for value in nearest) in answer.reason
     np.testing.assert_array_equal(answer.q, skill.predict(nearest[None])[0])
     assert answer.expected_error > 3.9
-
-
-@pytest.fixture
-def unchecked() -> Iterator[None]:
-    """As outside of tests: types aren't enforced, so the door itself must refuse."""
-    jaxtyping.config.update("jaxtyping_disable", True)
-    yield
-    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -65,7 +65,7 @@ def load_skill(folder: str | os.PathLike[str]) -> Skill:
     try:
         config = _config(facts["config"])
         box = UnitBox(*(jnp.asarray(tensors[f"box.{name}"]) for name in _BOX))
-        hidden = tuple(facts["hidden"])
+        hidden = replace(config, hidden=tuple(facts["hidden"])).hidden or ()
         learner = make_learner(config, box, hidden)
         space, joints = len(box.space_lower), len(box.joint_lower)
         template = jax.eval_shape(learner.init, jax.random.key(0), jnp.zeros(space), jnp.zeros(joints))

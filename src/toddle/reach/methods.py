@@ -179,7 +179,8 @@ def learner_named(config: ReachConfig) -> str:
     Raises:
         BadInput: no such method or learner, or an option that it hasn't.
     """
-    name = method_named(config.method).learner if config.learner is None else config.learner
+    method = method_named(config.method)
+    name = method.learner if config.learner is None else config.learner
     if name not in LEARNERS:
         raise unknown_name("learner", name, LEARNERS, where="--learner")
     if name != "perceptron" and config.hidden is not None:
