@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from jax import Array
 
 from toddle.reach.evaluate.figures import error_figures, errors_of, query_figures
 from toddle.reach.evaluate.seen import (
@@ -66,18 +67,30 @@ _remember = jax.jit(remember)
 
 
 def remember_all(stream: np.ndarray, chunk: int, key: jax.Array) -> Seen:
-    seen = nothing_seen(stream.shape[1])
+    seen = nothing_seen(3, stream.shape[1])
     for i, start in enumerate(range(0, len(stream), chunk)):
-        seen = _remember(seen, jax.random.fold_in(key, i), jnp.asarray(stream[start : start + chunk]))
+        x = jnp.asarray(stream[start : start + chunk])
+        seen = _remember(seen, jax.random.fold_in(key, i), posture_of(x), x)
     return seen
+
+
+def posture_of(x: Array) -> Array:
+    """Made-up joint values that tell which position they led to."""
+    return jnp.stack([x[:, 0] + 1, x[:, 1] + 2, x[:, 0] - x[:, 1]], axis=1)
+
+
+def test_postures_stay_with_the_positions_they_led_to() -> None:
+    stream = np.random.default_rng(3).random((3 * CAPACITY, 2)).astype(np.float32)
+    postures, positions = kept(remember_all(stream, 2048, jax.random.key(1)))
+    np.testing.assert_array_equal(postures, np.asarray(posture_of(jnp.asarray(positions))))
 
 
 def test_everything_is_kept_until_the_sample_is_full() -> None:
     stream = np.random.default_rng(0).random((CAPACITY, 2)).astype(np.float32)
     first = remember_all(stream[:1000], 500, jax.random.key(0))
-    np.testing.assert_array_equal(kept(first), stream[:1000])
+    np.testing.assert_array_equal(kept(first)[1], stream[:1000])
     assert int(first.total) == 1000
-    np.testing.assert_array_equal(kept(remember_all(stream, 512, jax.random.key(0))), stream)
+    np.testing.assert_array_equal(kept(remember_all(stream, 512, jax.random.key(0)))[1], stream)
 
 
 def test_every_position_ever_visited_is_kept_with_equal_chance() -> None:
@@ -86,7 +99,7 @@ def test_every_position_ever_visited_is_kept_with_equal_chance() -> None:
     stream = np.stack([np.arange(count) / count, np.zeros(count)], axis=1).astype(np.float32)
     counts = np.zeros(groups)
     for run in range(runs):
-        rows = kept(remember_all(stream, 1024, jax.random.key(run)))
+        rows = kept(remember_all(stream, 1024, jax.random.key(run)))[1]
         assert len(rows) == CAPACITY
         assert len(np.unique(rows[:, 0])) == CAPACITY, "a position is kept twice"
         counts += np.histogram(rows[:, 0], bins=groups, range=(0, 1))[0]
@@ -111,7 +124,8 @@ def test_coverage_counts_the_reachable_cells_that_were_entered(x: np.ndarray) ->
     reachable[: size * size // 2] = True  # the lower half, whichever axis comes first
     flat = np.asarray(cell_of(jnp.asarray(x)))
     assert len(set(flat.tolist())) == len(entered)
-    seen = _remember(nothing_seen(2), jax.random.key(0), jnp.asarray(x))
+    points = jnp.asarray(x)
+    seen = _remember(nothing_seen(3, 2), jax.random.key(0), posture_of(points), points)
     share = len({cell for cell in flat.tolist() if reachable[cell]}) / reachable.sum()
     assert float(coverage(seen, jnp.asarray(reachable))) == pytest.approx(share, abs=1e-6)
 

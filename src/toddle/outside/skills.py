@@ -30,7 +30,7 @@ from toddle.robots.catalogue import Choice
 _SKILL, _RUN = "skill", "run"
 _AGAIN = "learn it again"
 _BOX = ("joint_lower", "joint_span", "space_lower", "space_span")
-_PLAIN = ("home", "seen", "targets", "errors")
+_PLAIN = ("home", "seen", "postures", "targets", "errors")
 
 
 def save(skill: Skill, folder: str | os.PathLike[str]) -> Path:
@@ -71,11 +71,11 @@ def load_skill(folder: str | os.PathLike[str]) -> Skill:
         template = jax.eval_shape(learner.init, jax.random.key(0), jnp.zeros(space), jnp.zeros(joints))
         state = _unflat("state", template, tensors)
         _check(tensors, joints, space)
-        home, seen, targets, errors = (tensors[name] for name in _PLAIN)
+        home, seen, postures, targets, errors = (tensors[name] for name in _PLAIN)
         names = _texts(facts["joints"], joints)
         return Skill(
             choice_from(facts["source"]), names, home, config, hidden, box,
-            learner, state, seen, targets, errors, dict(facts["figures"]),
+            learner, state, seen, postures, targets, errors, dict(facts["figures"]),
         )  # fmt: skip
     except (LookupError, TypeError, ValueError, BadInput) as fault:
         raise BadInput(f"it is not a skill of this version ({fault})", where=str(path), remedy=_AGAIN) from fault

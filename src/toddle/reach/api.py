@@ -85,14 +85,15 @@ def skill_of(session: Session, cycle: Cycle, source: Choice, *, seconds: float =
         seconds: how long learning took, for the figures [s].
     """
     progress, setting = cycle.progress, session.setting
-    seen = np.asarray(setting.box.x_from_unit(jnp.asarray(kept(progress.seen))), float)
+    q, x = (jnp.asarray(values) for values in kept(progress.seen))
+    postures, seen = np.asarray(setting.box.q_from_unit(q), float), np.asarray(setting.box.x_from_unit(x), float)
     key = jax.random.fold_in(progress.key, 1)
     seen_targets = np.asarray(setting.box.x_from_unit(draw_seen(progress.seen, key, len(session.targets))), float)
     errors = errors_of(lambda x: session.predict(progress, x), session.observe, session.targets)
     hidden = getattr(setting.learner, "hidden", ())
     skill = Skill(
         source, session.body.joints, np.asarray(session.body.home, float), session.config, hidden,
-        setting.box, setting.learner, progress.learner, seen, session.targets, errors, {},
+        setting.box, setting.learner, progress.learner, seen, postures, session.targets, errors, {},
     )  # fmt: skip
     figures = {
         "robot": session.body.name,

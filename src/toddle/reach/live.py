@@ -35,14 +35,15 @@ def advance(setting: loop.Setting, plant: Plant, progress: loop.Progress, count:
     """Learn from `count` movements of a plant."""
     key, for_noise, for_seen = jax.random.split(progress.key, 3)
     noise = setting.explorer.draw(for_noise, count, setting.home)
-    visited = []
+    movements = []
     for i in range(count):
         progress, proposal = _propose(setting, progress, noise, jnp.int32(i))
         x = plant.move(np.asarray(setting.box.q_from_unit(proposal.q), float))
         unit = setting.box.x_to_unit(jnp.asarray(x, jnp.float32))
-        progress, _movement = _absorb(setting, progress, proposal, unit)
-        visited.append(unit)
-    return progress._replace(seen=remember(progress.seen, for_seen, jnp.stack(visited)), key=key)
+        progress, movement = _absorb(setting, progress, proposal, unit)
+        movements.append(movement)
+    made = jax.tree.map(lambda *rows: jnp.stack(rows), *movements)
+    return progress._replace(seen=remember(progress.seen, for_seen, made.q, made.x), key=key)
 
 
 def score(session: Session, progress: loop.Progress) -> loop.Scores:

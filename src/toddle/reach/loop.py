@@ -56,7 +56,7 @@ def begin(setting: Setting, key: jax.Array) -> Progress:
     return Progress(
         setting.explorer.init(setting.home),
         setting.learner.init(first, setting.home.x, setting.home.q),
-        nothing_seen(len(setting.home.x)),
+        nothing_seen(len(setting.home.q), len(setting.home.x)),
         key,
     )
 
@@ -90,7 +90,7 @@ def advance(setting: Setting, body: Body, progress: Progress, count: int) -> tup
         return (now.explorer, now.learner), movement
 
     (explorer, learner), movements = jax.lax.scan(step, (progress.explorer, progress.learner), noise)
-    return Progress(explorer, learner, remember(progress.seen, for_seen, movements.x), key), movements
+    return Progress(explorer, learner, remember(progress.seen, for_seen, movements.q, movements.x), key), movements
 
 
 advance_jit = eqx.filter_jit(advance)

@@ -20,6 +20,7 @@ from toddle.reach.config import ReachConfig
 from toddle.reach.learn.learner import Learner
 from toddle.reach.observe import Observe, observer
 from toddle.reach.solve.closed_loop import reach_for
+from toddle.reach.solve.memory import Memory
 from toddle.reach.unit_box import UnitBox
 from toddle.robots.body import Body, Plant
 from toddle.robots.catalogue import Choice
@@ -45,6 +46,7 @@ class Skill:
         learner: the learner.
         state: what it learned.
         seen: a uniform sample of the positions visited while learning [m].
+        postures: the joint values that led there [rad or m].
         targets: the fixed test set [m], never learned from.
         errors: open-loop error on each of its points [m].
         figures: how well it did (see `toddle.reach.evaluate.figures`).
@@ -59,6 +61,7 @@ class Skill:
     learner: Learner
     state: object
     seen: Float[np.ndarray, "kept space"]
+    postures: Float[np.ndarray, "kept joints"]
     targets: Float[np.ndarray, "points space"]
     errors: Float[np.ndarray, " points"]
     figures: Mapping[str, object]
@@ -71,7 +74,9 @@ class Skill:
         self, observe: Observe, targets: Float[np.ndarray, "batch space"], looks: int
     ) -> tuple[Float[np.ndarray, "batch joints"], Float[np.ndarray, "answers batch"]]:
         """Answers for targets [m], corrected by looking; and the best error after 0, 1, ... looks [m]."""
-        return reach_for(self.box, self.learner, self.state, observe, targets, looks)
+        q, x = (jnp.asarray(values, jnp.float32) for values in (self.postures, self.seen))
+        memory = Memory(self.box.q_to_unit(q), self.box.x_to_unit(x))
+        return reach_for(self.box, self.learner, self.state, observe, targets, looks, memory)
 
     def expected_error(self, target: Float[np.ndarray, " space"]) -> float:
         """The open-loop error to expect at a target [m]: the mean over the nearest held-out test targets."""

@@ -1,4 +1,4 @@
-"""What the arm has seen so far: a uniform sample of all visited positions, and the cells of space they fill.
+"""What the arm has seen so far: a uniform sample of all its movements, and the cells of space they filled.
 
 The thesis draws its "seen test set" from the positions visited so far (Mahboob 2015, section 4.3); keeping all of them
 would grow without end, so a fixed number is kept, each visited position with equal chance (reservoir sampling,
@@ -14,18 +14,20 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-CAPACITY = 4096
+CAPACITY = 8192
 
 
 class Seen(NamedTuple):
-    """Visited positions in the unit box.
+    """Movements made, in the unit box.
 
     Attributes:
-        positions: the kept ones; rows at and after `total` are not filled yet.
+        postures: the joint values of the kept ones.
+        positions: where they brought the tip; rows of both at and after `total` are not filled yet.
         total: how many positions were visited in all.
         visited: which cells of a regular grid over the unit box were entered.
     """
 
+    postures: Float[Array, "capacity joints"]
     positions: Float[Array, "capacity space"]
     total: Int[Array, ""]
     visited: Bool[Array, " cells"]
@@ -36,10 +38,10 @@ def cells_per_axis(space: int) -> int:
     return 40 if space == 2 else 16
 
 
-def nothing_seen(space: int) -> Seen:
+def nothing_seen(joints: int, space: int) -> Seen:
     """The record before the first movement."""
     cells = cells_per_axis(space) ** space
-    return Seen(jnp.zeros((CAPACITY, space)), jnp.int32(0), jnp.zeros(cells, bool))
+    return Seen(jnp.zeros((CAPACITY, joints)), jnp.zeros((CAPACITY, space)), jnp.int32(0), jnp.zeros(cells, bool))
 
 
 def cell_of(x: Float[Array, "*batch space"]) -> Int[Array, "*batch"]:
@@ -50,12 +52,19 @@ def cell_of(x: Float[Array, "*batch space"]) -> Int[Array, "*batch"]:
     return index @ strides
 
 
-def remember(seen: Seen, key: jax.Array, x: Float[Array, "chunk space"]) -> Seen:
-    """The record after a chunk of visited positions."""
+def remember(seen: Seen, key: jax.Array, q: Float[Array, "chunk joints"], x: Float[Array, "chunk space"]) -> Seen:
+    """The record after a chunk of movements."""
     order = seen.total + jnp.arange(len(x))
     slot = jnp.where(order < CAPACITY, order, jax.random.randint(key, (len(x),), 0, jnp.maximum(order + 1, 1)))
-    positions = seen.positions.at[slot].set(x, mode="drop")
-    return Seen(positions, seen.total + len(x), seen.visited.at[cell_of(x)].set(True))
+    # of two movements for one slot the later one stays, on every device
+    latest = jnp.full(CAPACITY, -1).at[slot].max(jnp.arange(len(x)), mode="drop")
+    stays = (latest < 0)[:, None]
+    return Seen(
+        jnp.where(stays, seen.postures, q[latest]),
+        jnp.where(stays, seen.positions, x[latest]),
+        seen.total + len(x),
+        seen.visited.at[cell_of(x)].set(True),
+    )
 
 
 def draw_seen(seen: Seen, key: jax.Array, count: int) -> Float[Array, "count space"]:
@@ -69,6 +78,7 @@ def coverage(seen: Seen, reachable_cells: Bool[Array, " cells"]) -> Float[Array,
     return jnp.sum(seen.visited & reachable_cells) / jnp.maximum(jnp.sum(reachable_cells), 1)
 
 
-def kept(seen: Seen) -> Float[np.ndarray, "kept space"]:
-    """The kept positions that are filled (unit box)."""
-    return np.asarray(seen.positions[: min(int(seen.total), CAPACITY)])
+def kept(seen: Seen) -> tuple[Float[np.ndarray, "kept joints"], Float[np.ndarray, "kept space"]]:
+    """The kept postures and positions that are filled (unit box)."""
+    filled = min(int(seen.total), CAPACITY)
+    return np.asarray(seen.postures[:filled]), np.asarray(seen.positions[:filled])

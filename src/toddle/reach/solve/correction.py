@@ -20,6 +20,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from toddle.failures import BadInput
+from toddle.reach.solve.memory import Memory, recall
 
 Predict = Callable[[Float[Array, " space"]], Float[Array, " joints"]]
 Observe = Callable[[Float[Array, "points joints"]], Float[Array, "points space"]]
@@ -62,6 +63,7 @@ def correct(
     scale: Float[Array, " space"] | float = 1.0,
     method: Literal["newton", "shift"] = "newton",
     largest: float = 0.15,
+    memory: Memory | None = None,
 ) -> Corrected:
     """Answers for targets, each corrected by what is seen after every movement (all in the unit box).
 
@@ -76,6 +78,7 @@ def correct(
         scale: lengths of the box's edges [m], if errors are wanted in metres.
         method: "newton" or "shift", as above.
         largest: the most that a joint moves in one correction of "newton", as a fraction of its range.
+        memory: remembered movements that "newton" may start from, where they came closer than the first answer.
 
     Raises:
         BadInput: looks is negative.
@@ -87,6 +90,10 @@ def correct(
     attempt = _Attempt(q, observe(q), targets, slope)
     best = _Best(q, _distance(attempt.x, targets, edges))
     errors = [best.error]
+    if memory is not None and method == "newton":
+        start = recall(memory, q, attempt.x, targets, edges)
+        attempt = attempt._replace(q=start.q, x=start.x, slope=start.slope)
+        best = _better(best, attempt, targets, edges) if looks else best
     for _ in range(looks):
         if method == "newton":
             attempt = _newton(attempt, observe, targets, largest)
