@@ -15,6 +15,7 @@ import os
 import platform
 import time
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from statistics import median
 
@@ -62,7 +63,7 @@ def numpy_loop(chain: Chain, setting: loop.Setting, count: int, seed: int) -> li
         return (pose @ tip)[:3, 3]
 
     sizes = (3, HIDDEN, len(low))
-    weights = [rng.uniform(-1, 1, (b, a)) for a, b in zip(sizes[:-1], sizes[1:], strict=True)]
+    weights = [rng.uniform(-1, 1, (b, a)) for a, b in pairwise(sizes)]
     biases = [np.zeros(b) for b in sizes[1:]]
 
     def activations(x: np.ndarray) -> list[np.ndarray]:

@@ -51,9 +51,7 @@ def test_help_answers_within_half_a_second() -> None:
 
 def test_importing_toddle_imports_nothing_heavy() -> None:
     script = "import sys, toddle; print(sorted({'jax', 'mujoco', 'matplotlib'} & set(sys.modules)))"
-    done = subprocess.run(
-        [sys.executable, "-c", script], check=True, capture_output=True, text=True, timeout=60
-    )
+    done = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True, timeout=60)
     assert done.stdout == "[]\n"
 
 

@@ -17,9 +17,7 @@ from toddle.failures import BadInput, ToddleError
 
 def toddle(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-c", "import sys; from toddle.cli import main; sys.exit(main())", *words]
-    return subprocess.run(
-        command, env={**os.environ, **environment}, capture_output=True, text=True, timeout=60
-    )
+    return subprocess.run(command, env={**os.environ, **environment}, capture_output=True, text=True, timeout=60)
 
 
 @pytest.fixture
@@ -55,9 +53,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
         ("", "toddle: no command named ''; known: doctor, experiment, reach"),
     ],
 )
-def test_an_unknown_word_is_answered_with_the_nearest(
-    word: str, line: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_unknown_word_is_answered_with_the_nearest(word: str, line: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([word]) == 2
     said = capsys.readouterr()
     assert said.out == ""
@@ -130,9 +126,7 @@ def test_help_imports_nothing_heavy() -> None:
         "import sys; from toddle.cli import main; main(['--help']);"
         "print([m for m in ('jax', 'numpy', 'mujoco', 'matplotlib', 'rich', 'tyro') if m in sys.modules])"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True
-    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
 
 

@@ -20,6 +20,7 @@ from toddle.robots.body import Body
 _REACHABLE = 20_000
 _BATCH = 256
 _RATE = 0.02
+_TINY = 1e-12  # [m^2]
 
 
 def capacity(session: Session, *, starts: int, steps: int, seed: int) -> float:
@@ -52,7 +53,8 @@ def _train(
         q = jax.vmap(lambda target: learner.predict(layers, target))(box.x_to_unit(x))
         # joints stop at their limits, but the slope is followed beyond them, lest an answer stick there
         q = q + jax.lax.stop_gradient(jnp.clip(q, 0.0, 1.0) - q)
-        return jnp.linalg.norm(jax.vmap(body.forward)(box.q_from_unit(q)) - x, axis=-1)
+        missed = jax.vmap(body.forward)(box.q_from_unit(q)) - x
+        return jnp.sqrt(jnp.sum(missed**2, axis=-1) + _TINY)  # a distance of zero has no slope
 
     def from_start(key: jax.Array) -> Array:
         layers = _start(key, (targets.shape[1], *learner.hidden, len(body.joints)))

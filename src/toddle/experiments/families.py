@@ -67,7 +67,7 @@ class Family:
         running = np.convolve(self.fixed.mean(axis=0), np.ones(window) / window, mode="valid")
         return int(np.argmax(running <= (1 + within) * self.settled()[0])) + window - 1
 
-    def course(self, most: int = 250) -> dict[str, object]:
+    def course(self, most: int = 100) -> dict[str, object]:
         """For the JSON file: means over the runs at so many of the tests."""
         some = slice(None, None, max(1, len(self.samples) // most))
         return {

@@ -102,8 +102,8 @@ def courses(
     axes = plain_axes(figure)
     for k, (name, (x, y)) in enumerate(lines.items()):
         axes.plot(x, y, lw=1.2, color=f"C{k}", label=name)
-    for name, level in levels.items():
-        axes.axhline(level, color=INK, lw=0.8, ls="--", label=name)
+    for (name, level), style in zip(levels.items(), ("--", ":", "-."), strict=False):
+        axes.axhline(level, color=INK, lw=0.9, ls=style, label=name)
     axes.set(xlabel=x_label, ylabel=y_label, title=title, ylim=(0, None))
     axes.legend(frameon=False)
     save_figure(figure, path)
