@@ -21,6 +21,5 @@ def finger(q: np.ndarray) -> np.ndarray:
 noise = np.random.default_rng(0)
 plant = CallablePlant(finger, joints=("base", "knuckle"), lower=[0.0, 0.2], upper=[1.4, 1.5], name="finger")
 skill = toddle.learn(plant, samples=2_000, per_cycle=1_000, test_points=30, seed=0)
-print(
-    f"open loop {skill.figures['fixed_error_mean_mm']:.1f} mm, closed {skill.figures['closed_loop_error_mean_mm']:.1f} mm"
-)
+figures = skill.figures
+print(f"open loop {figures['fixed_error_mean_mm']:.1f} mm, closed loop {figures['closed_loop_error_mean_mm']:.1f} mm")

@@ -39,7 +39,8 @@ class Reach:
 
     Attributes:
         robot: a name (nicu, suralp, icub_arm, planar:7, planar3, scara, bha), or the path of a URDF or MJCF file.
-        method: how it explores; what suits the arm unless given.
+        method: how it explores: goal-and-motor-babbling, goal-babbling, random-goal-babbling, active-goal,
+            active-motor, motor-babbling or continuous-motor-babbling; what suits the arm unless given.
         learner: what learns from it: perceptron or local-linear; the method's own unless given.
         samples: movements to learn from; 300000 unless given, 5000 in physics.
         seed: of all randomness.
