@@ -1,9 +1,9 @@
 """Remembered movements: answer with the nearest movement seen, moved on along its neighbours (lazy, local learning).
 
 Nothing is averaged: where an arm reaches a place in several ways, each is remembered for itself, and an answer comes
-from one of them. To answer for x, take the movement (q_0, x_0) whose tip came nearest; fit the slope J of forward kinematics
-there to the movements with postures most like q_0 (locally weighted regression, Atkeson, Moore and Schaal 1997); and
-move by the smallest step dq within the joint limits with J dq = x - x_0.
+from one of them. To answer for x, take the movement (q_0, x_0) whose tip came nearest; fit the slope J of forward
+kinematics there to the movements with postures most like q_0 (locally weighted regression, Atkeson, Moore and Schaal
+1997); and move by the smallest step dq within the joint limits with J dq = x - x_0.
 """
 
 from __future__ import annotations
