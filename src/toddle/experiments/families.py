@@ -165,3 +165,10 @@ def errors_point_by_point(
         seen,
         1000 * errors_of(predict, session.observe, seen),
     )
+
+
+def visited(family: Family, progress: loop.Progress) -> Float[np.ndarray, "kept space"]:
+    """Positions that a run has visited, at most 4,096 of them [m]."""
+    from toddle.reach.evaluate.seen import kept
+
+    return np.asarray(family.session.setting.box.x_from_unit(jnp.asarray(kept(progress.seen)[1])), float)

@@ -13,12 +13,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import jax.numpy as jnp
 import numpy as np
 
 from toddle.experiments.capacity import capacity
 from toddle.experiments.experiment import Experiment, Outcome, Row, Task
-from toddle.experiments.families import Family, errors_point_by_point, learn_family, open_for
+from toddle.experiments.families import Family, errors_point_by_point, learn_family, open_for, visited
 from toddle.reach.config import ReachConfig
 
 METHOD = "goal-and-motor-babbling"
@@ -122,7 +121,6 @@ def draw(
 ) -> None:
     """Figures 4.6, 4.7, 4.8 with C.1, and C.2."""
     from toddle.outside import document_pictures, pictures
-    from toddle.reach.evaluate.seen import kept
 
     cycles = np.arange(1, len(family.samples) + 1)
     document_pictures.courses(
@@ -131,9 +129,8 @@ def draw(
         {"document's best cycle, fixed": document.fixed, "document's best cycle, seen": document.seen},
         x_label="testing cycle", y_label="mean error [mm]", title="figure 4.6: error over testing cycles, one run",
     )  # fmt: skip
-    box = family.session.setting.box
-    positions = np.asarray(box.x_from_unit(jnp.asarray(kept(family.best.seen))), float)
-    pictures.explored_space(folder / "figure-4-7.png", positions, np.zeros(3), title="figure 4.7: area explored")
+    explored = visited(family, family.best)
+    pictures.explored_space(folder / "figure-4-7.png", explored, np.zeros(3), title="figure 4.7: area explored")
     pictures.targets_by_error(
         folder / "figure-4-8-fixed.png", family.session.targets, fixed / 1000, title="figures 4.8, C.1: fixed test set"
     )

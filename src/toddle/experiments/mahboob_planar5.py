@@ -15,11 +15,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-import jax.numpy as jnp
-import numpy as np
-
 from toddle.experiments.experiment import Experiment, Outcome, Row, Task
-from toddle.experiments.families import Family, learn_family
+from toddle.experiments.families import Family, learn_family, visited
 from toddle.reach.config import ReachConfig
 from toddle.reach.session import open_session
 from toddle.robots.planar import planar
@@ -102,7 +99,6 @@ def run(task: Task) -> Outcome:
 def draw(family: Family, covered: dict[int, float], folder: Path) -> None:
     """Figures A.3 and A.4 (error over tests and movements), A.5 to A.8 (workspace discovery)."""
     from toddle.outside import document_pictures
-    from toddle.reach.evaluate.seen import kept
 
     document_pictures.courses(
         folder / "figure-a-3-a-4.png",
@@ -110,11 +106,8 @@ def draw(family: Family, covered: dict[int, float], folder: Path) -> None:
         {},
         x_label="movements (a test each 1,000)", y_label="mean error [mm]", title="figures A.3, A.4: one run",
     )  # fmt: skip
-    box = family.session.setting.box
-    positions = {
-        f"{count:,} movements: {covered[count]:.0f} % visited": np.asarray(
-            box.x_from_unit(jnp.asarray(kept(progress.seen))), float
-        )
+    explored = {
+        f"{count:,} movements: {covered[count]:.0f} % visited": visited(family, progress)
         for count, progress in family.kept.items()
     }
     document_pictures.discovery(

@@ -11,11 +11,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-import jax.numpy as jnp
 import numpy as np
 
 from toddle.experiments.experiment import Experiment, Outcome, Row, Task
-from toddle.experiments.families import Family, learn_family, open_for
+from toddle.experiments.families import Family, learn_family, open_for, visited
 from toddle.reach.config import ReachConfig
 
 LINES_A_TEST = 200  # of the document
@@ -104,7 +103,6 @@ def run(task: Task) -> Outcome:
 def draw(slp: Family, mlp: Family, folder: Path) -> None:
     """Figures 4.9 (SLP over tests), 4.10 (area explored by it), 4.11 (both over lines) and 4.12 (over movements)."""
     from toddle.outside import document_pictures, pictures
-    from toddle.reach.evaluate.seen import kept
 
     tests = slp.lines[0] / LINES_A_TEST
     document_pictures.courses(
@@ -113,10 +111,8 @@ def draw(slp: Family, mlp: Family, folder: Path) -> None:
         {},
         x_label="tests, one for each 200 lines", y_label="mean error [mm]", title="figure 4.9: single-layer perceptron",
     )  # fmt: skip
-    positions = np.asarray(slp.session.setting.box.x_from_unit(jnp.asarray(kept(slp.best.seen))), float)
-    pictures.explored_space(
-        folder / "figure-4-10.png", positions, np.zeros(3), title="figure 4.10: area explored by the SLP"
-    )
+    explored = visited(slp, slp.best)
+    pictures.explored_space(folder / "figure-4-10.png", explored, np.zeros(3), title="figure 4.10: explored by the SLP")
     for name, label, over in (
         ("4-11", "tests, one for each 200 lines", lambda family: family.lines.mean(axis=0) / LINES_A_TEST),
         ("4-12", "movements", lambda family: family.samples),

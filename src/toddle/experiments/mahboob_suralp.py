@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import jax.numpy as jnp
 import numpy as np
 
 from toddle.experiments.experiment import Experiment, Outcome, Row, Task
-from toddle.experiments.families import Family, learn_family, open_for
+from toddle.experiments.families import Family, learn_family, open_for, visited
 from toddle.reach.config import ReachConfig
 
 METHOD = "goal-and-motor-babbling"
@@ -91,7 +90,6 @@ def run(task: Task) -> Outcome:
 def draw(family: Family, document: Printed, folder: Path) -> None:
     """Figures 5.4 to 5.7 (error on both test sets, over tests and movements) and 5.8 (area explored)."""
     from toddle.outside import document_pictures, pictures
-    from toddle.reach.evaluate.seen import kept
 
     tests = np.arange(1, len(family.samples) + 1)
     for name, label, over in (("5-4-5-6", "testing cycle", tests), ("5-5-5-7", "movements", family.samples)):
@@ -102,8 +100,8 @@ def draw(family: Family, document: Printed, folder: Path) -> None:
             x_label=label, y_label="mean error [mm]",
             title=f"figures {name[:3].replace('-', '.')}, {name[4:].replace('-', '.')}: one run",
         )  # fmt: skip
-    positions = np.asarray(family.session.setting.box.x_from_unit(jnp.asarray(kept(family.best.seen))), float)
-    pictures.explored_space(folder / "figure-5-8.png", positions, np.zeros(3), title="figure 5.8: area explored")
+    explored = visited(family, family.best)
+    pictures.explored_space(folder / "figure-5-8.png", explored, np.zeros(3), title="figure 5.8: area explored")
 
 
 EXPERIMENT = Experiment("mahboob-suralp", "Mahboob 2015, figures 5.4-5.8", run)

@@ -11,11 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import jax.numpy as jnp
-import numpy as np
-
 from toddle.experiments.experiment import Experiment, Outcome, Row, Task
-from toddle.experiments.families import Family, learn_family, open_for
+from toddle.experiments.families import Family, learn_family, open_for, visited
 from toddle.reach.config import ReachConfig
 
 
@@ -91,7 +88,6 @@ def rows_of(joints: int, family: Family) -> list[Row]:
 def draw(families: dict[int, Family], folder: Path) -> None:
     """Error over movements of all arms, and the space that each explored."""
     from toddle.outside import document_pictures
-    from toddle.reach.evaluate.seen import kept
 
     document_pictures.courses(
         folder / "error.png",
@@ -99,13 +95,11 @@ def draw(families: dict[int, Family], folder: Path) -> None:
         {},
         x_label="movements", y_label="mean error, fixed test set [mm]", title="direction sampling on planar arms",
     )  # fmt: skip
-    positions = {
-        f"{joints} joints: {family.coverage[0, -1]:.0f} % visited": np.asarray(
-            family.session.setting.box.x_from_unit(jnp.asarray(kept(family.best.seen)))
-        )
+    explored = {
+        f"{joints} joints: {family.coverage[0, -1]:.0f} % visited": visited(family, family.best)
         for joints, family in families.items()
     }
-    document_pictures.discovery(folder / "explored.png", positions, title="explored space (4,096 positions shown)")
+    document_pictures.discovery(folder / "explored.png", explored, title="explored space (4,096 positions shown)")
 
 
 EXPERIMENT = Experiment("rolf-direction-sampling", "Rolf 2013, planar arms of 5, 20 and 50 joints", run)
