@@ -112,7 +112,7 @@ def draw(family: Family, covered: dict[int, float], folder: Path) -> None:
     }
     document_pictures.discovery(
         folder / "figure-a-5-a-8.png",
-        positions,
+        explored,
         title="figures A.5 to A.8: workspace discovery (4,096 positions shown)",
     )
 
