@@ -4,16 +4,28 @@ A local linear map learns from goals along lines in random directions, with rate
 slowly. Mahboob 2015 (4.1) reports of Rolf's experiment that "the approach works well enough for 5 DOF as well as 50
 DOF" and converges after "almost 1.000.000 examples"; the arms are one metre long. The papers' figures are curves: no
 number is printed that could stand beside ours, so ours stand beside what we ask of them.
+
+Joint ranges, home and test goals are ours too: a base that turns by 2.5 rad to each side, all others by 90 degrees; a
+home that is bent, lest it lie at the edge of what can be reached; goals 0.3 to 0.95 m away, up to 2 rad to each side.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
 from toddle.experiments.experiment import Experiment, Outcome, Row, Task
-from toddle.experiments.families import Family, learn_family, open_for, visited
+from toddle.experiments.families import Family, learn_family, visited
 from toddle.reach.config import ReachConfig
+from toddle.reach.evaluate.targets import fixed_targets
+from toddle.reach.session import Session, open_session
+from toddle.robots.chain import Chain
+from toddle.robots.planar import planar
 
 
 @dataclass(frozen=True)
@@ -23,65 +35,108 @@ class Parameters:
     Attributes:
         joints: of the arms.
         method, learner: names of `toddle.reach.methods`.
+        base_limit: the first joint turns by plus or minus this [rad].
+        bend: sum of the joint angles at home [rad]; the base turns until the tip is straight ahead.
+        nearest, farthest: distance of test goals from the base [m].
+        widest: their angle from straight ahead, at most [rad].
+        goals: how many there are.
         movements: that each run learns from.
         per_cycle: movements between two tests.
         seeds: runs of each arm.
-        asked_mm: mean error on the fixed test set, over the last half, up to which an arm has learned to reach [mm].
+        asked_mm: for each arm, the mean error over the last fifth of the tests up to which it has learned [mm].
+        stays_below_mm: the error that no run may exceed in the last half; "it bootstraps" [mm].
     """
 
     joints: tuple[int, ...] = (5, 20, 50)
     method: str = "goal-babbling"
     learner: str = "local-linear"
+    base_limit: float = 2.5
+    bend: float = 0.9 * math.pi
+    nearest: float = 0.3
+    farthest: float = 0.95
+    widest: float = 2.0
+    goals: int = 110
     movements: int = 400_000
     per_cycle: int = 4_000
     seeds: int = 3
     asked_mm: tuple[float, ...] = (15.0, 25.0, 50.0)
+    stays_below_mm: tuple[float, ...] = (math.inf, math.inf, 50.0)
 
 
 FULL = Parameters()
-QUICK = replace(FULL, joints=(5, 20), movements=60_000, per_cycle=2_000, seeds=1)
+QUICK = replace(FULL, joints=(5, 20), movements=60_000, per_cycle=2_000, seeds=2, asked_mm=(75.0, 150.0))
 DOCUMENT_CONVERGES = 1e6  # movements, Mahboob 2015, section 4.1
+
+
+def arm(joints: int, parameters: Parameters) -> Chain:
+    """A planar arm with a wide base and a bent home."""
+    bent = np.full(joints, parameters.bend / joints)
+    links = np.cumsum(bent)
+    bent[0] -= math.atan2(np.sin(links).sum(), np.cos(links).sum())
+    whole = planar(joints)
+    limit = parameters.base_limit
+    return replace(
+        whole,
+        home=jnp.asarray(bent, jnp.float32),
+        lower=whole.lower.at[0].set(-limit),
+        upper=whole.upper.at[0].set(limit),
+    )
+
+
+def goals_on_a_ring(parameters: Parameters, seed: int) -> Float[np.ndarray, "goals 2"]:
+    """Goals spread over a part of a ring [m]."""
+    drawn = np.random.default_rng(seed)
+    distance = np.sqrt(drawn.uniform(parameters.nearest**2, parameters.farthest**2, 20_000))
+    angle = drawn.uniform(-parameters.widest, parameters.widest, 20_000)
+    ring = np.stack([distance * np.cos(angle), distance * np.sin(angle)], axis=1)
+    return fixed_targets(ring, parameters.goals)[0]
+
+
+def opened(joints: int, parameters: Parameters, seed: int) -> Session:
+    """A session on the arm, with the ring's goals as its fixed test set."""
+    config = ReachConfig(
+        method=parameters.method, learner=parameters.learner, samples=parameters.movements,
+        per_cycle=parameters.per_cycle, seed=seed,
+    )  # fmt: skip
+    return replace(open_session(arm(joints, parameters), config), targets=goals_on_a_ring(parameters, seed))
 
 
 def run(task: Task) -> Outcome:
     """Each arm's runs; error and discovered workspace over movements."""
     parameters = FULL if task.full else QUICK
     parameters = replace(parameters, seeds=task.seeds or parameters.seeds)
-    config = ReachConfig(
-        method=parameters.method, learner=parameters.learner, samples=parameters.movements,
-        per_cycle=parameters.per_cycle, seed=task.seed,
-    )  # fmt: skip
     families: dict[int, Family] = {}
-    rows: list[Row] = []
     for k, joints in enumerate(parameters.joints):
-        if task.stopped():
-            break
-        share = 1 / len(parameters.joints)
-        session = open_for(f"planar:{joints}", config)
-        families[joints] = family = learn_family(session, parameters.seeds, task.part(k * share, (k + 1) * share))
-        rows += rows_of(joints, family)
+        if not task.stopped():
+            part = task.part(k / len(parameters.joints), (k + 1) / len(parameters.joints))
+            families[joints] = learn_family(opened(joints, parameters, task.seed), parameters.seeds, part)
     draw(families, task.folder)
-    half = {joints: family.settled(0.5)[0] for joints, family in families.items()}
-    asked = dict(zip(parameters.joints, parameters.asked_mm, strict=False))
-    holds = len(half) == len(parameters.joints) and all(half[joints] <= asked[joints] for joints in half)
-    verdict = "; ".join(f"{joints} joints {half[joints]:.1f} mm (asked: {asked[joints]:g})" for joints in half)
-    figures = {f"planar:{joints}": family.course() for joints, family in families.items()}
-    return Outcome(tuple(rows), f"over the last half {verdict}", holds, parameters, figures)
+    rows = [row for joints, family in families.items() for row in rows_of(joints, family)]
+    found = {
+        joints: (families[joints].settled()[0], last_half(families[joints]).max() < below, asked)
+        for joints, asked, below in zip(parameters.joints, parameters.asked_mm, parameters.stays_below_mm, strict=False)
+        if joints in families
+    }
+    holds = len(found) == len(parameters.joints) and all(mm <= asked and stays for mm, stays, asked in found.values())
+    verdict = "; ".join(f"{joints} joints {mm:.1f} mm ({asked:g} asked)" for joints, (mm, _, asked) in found.items())
+    figures = {f"{joints} joints": family.course() for joints, family in families.items()}
+    return Outcome(tuple(rows), f"over the last fifth of the tests {verdict}", holds, parameters, figures)
+
+
+def last_half(family: Family) -> Float[np.ndarray, "seeds tests"]:
+    """Errors on the fixed test set in the last half of the tests [mm]."""
+    return family.fixed[:, len(family.samples) // 2 :]
 
 
 def rows_of(joints: int, family: Family) -> list[Row]:
     """What one arm comes to."""
-    half = family.fixed[:, len(family.samples) // 2 :]
+    settles = float(family.samples[family.settles_at()])
     return [
-        Row(f"{joints} joints: fixed test set, mean over the last half", float(half.mean()), None, "mm"),
-        Row(f"{joints} joints: fixed test set, worst test of the last half", float(half.max()), None, "mm"),
         Row(f"{joints} joints: fixed test set, last fifth", family.settled()[0], None, "mm"),
+        Row(f"{joints} joints: seen test set, last fifth", family.settled()[1], None, "mm"),
+        Row(f"{joints} joints: worst test of the last half, any run", float(last_half(family).max()), None, "mm"),
         Row(f"{joints} joints: workspace visited", float(family.coverage[:, -1].mean()), None, "%"),
-        Row(
-            f"{joints} joints: movements until the error settles",
-            float(family.samples[family.settles_at()]),
-            DOCUMENT_CONVERGES,
-        ),
+        Row(f"{joints} joints: movements until the error settles", settles, DOCUMENT_CONVERGES),
     ]
 
 
