@@ -65,7 +65,7 @@ def plain_skill() -> Skill:
 @functools.cache
 def local_linear_skill() -> Skill:
     """A skill that is a local linear map, as it is before it has learned anything."""
-    config = ReachConfig(learner="local-linear", samples=400)
+    config = replace(skill().config, learner="local-linear", hidden=None)
     opened = session()
     learner = make_learner(config, opened.setting.box, ())
     home = opened.setting.home

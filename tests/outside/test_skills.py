@@ -59,7 +59,7 @@ def test_a_saved_skill_answers_as_it_did_bit_for_bit(kind: str, tmp_path: Path) 
     assert equal((found.state, found.box), (skill.state, skill.box))
     for name in ("source", "joints", "config", "hidden", "figures"):
         assert getattr(found, name) == getattr(skill, name), name
-    for name in ("home", "seen", "targets", "errors"):
+    for name in ("home", "seen", "postures", "targets", "errors"):
         assert getattr(found, name).tobytes() == getattr(skill, name).tobytes(), name
 
 
@@ -101,6 +101,7 @@ FORGERIES = {
     "no targets": forged_tensors(lambda a: a.update(targets=a["targets"][:0], errors=a["errors"][:0])),
     "nothing seen": forged_tensors(lambda a: a.update(seen=a["seen"][:0])),
     "seen in space, targets in the plane": forged_tensors(lambda a: a.update(seen=np.zeros((5, 3)))),
+    "fewer postures than positions": forged_tensors(lambda a: a.update(postures=a["postures"][1:])),
     "a box of other dimensions": forged_tensors(lambda a: a.update({"box.space_span": np.ones(3, np.float32)})),
     "a home of one joint": forged_tensors(lambda a: a.update(home=np.zeros(1))),
     "a name too many": forged(lambda record: record["facts"]["joints"].append("more")),

@@ -70,7 +70,7 @@ def test_an_answer_tried_on_the_arm_is_told_with_the_error_that_was_seen() -> No
 
 
 def test_a_verdict_follows_from_the_tolerance() -> None:
-    skill, target = tiny.skill(), tiny.skill().seen[0]
+    skill, target = tiny.skill(), tiny.skill().targets[0]
     seen = toddle.solve(skill, target, robot=ARM, tolerance=10.0)
     assert seen.verdict is Verdict.REACHED
     error = seen.expected_error

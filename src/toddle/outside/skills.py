@@ -84,7 +84,13 @@ def load_skill(folder: str | os.PathLike[str]) -> Skill:
 def _check(tensors: Mapping[str, np.ndarray], joints: int, space: int) -> None:
     """Refuse tensors that don't fit each other, or that aren't finite."""
     points, seen = len(tensors["targets"]), len(tensors["seen"])
-    shapes = {"home": (joints,), "seen": (seen, space), "targets": (points, space), "errors": (points,)}
+    shapes = {
+        "home": (joints,),
+        "seen": (seen, space),
+        "postures": (seen, joints),
+        "targets": (points, space),
+        "errors": (points,),
+    }
     shapes |= {"box.joint_span": (joints,), "box.space_span": (space,)}
     for name, shape in shapes.items():
         if tensors[name].shape != shape or not len(tensors[name]):

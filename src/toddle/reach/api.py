@@ -7,18 +7,22 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Literal, TypedDict, Unpack
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from toddle.failures import BadInput, unknown_name
 from toddle.reach.config import ReachConfig
 from toddle.reach.evaluate.figures import error_figures, errors_of, query_figures
-from toddle.reach.evaluate.seen import draw_seen, kept
+from toddle.reach.evaluate.seen import Seen, draw_seen, kept
+from toddle.reach.loop import Progress
 from toddle.reach.observe import observer
 from toddle.reach.session import Cycle, Session, cycles, open_session, start
 from toddle.reach.skill import Skill
 from toddle.reach.solve.query import query_of
+from toddle.reach.unit_box import UnitBox
 from toddle.robots.body import Body, Plant
 from toddle.robots.catalogue import Choice, load, load_choice, record
 
@@ -30,7 +34,7 @@ class Options(TypedDict, total=False):
 
     method: str | None
     learner: str | None
-    samples: int
+    samples: int | None
     seed: int
     hidden: tuple[int, ...] | None
     learning_rate: float | None
@@ -85,10 +89,8 @@ def skill_of(session: Session, cycle: Cycle, source: Choice, *, seconds: float =
         seconds: how long learning took, for the figures [s].
     """
     progress, setting = cycle.progress, session.setting
-    q, x = (jnp.asarray(values) for values in kept(progress.seen))
-    postures, seen = np.asarray(setting.box.q_from_unit(q), float), np.asarray(setting.box.x_from_unit(x), float)
-    key = jax.random.fold_in(progress.key, 1)
-    seen_targets = np.asarray(setting.box.x_from_unit(draw_seen(progress.seen, key, len(session.targets))), float)
+    physical, drawn = _seen(setting.box, progress, len(session.targets))
+    (postures, seen), seen_targets = (values.astype(float) for values in kept(physical)), np.asarray(drawn, float)
     errors = errors_of(lambda x: session.predict(progress, x), session.observe, session.targets)
     hidden = getattr(setting.learner, "hidden", ())
     skill = Skill(
@@ -110,6 +112,14 @@ def skill_of(session: Session, cycle: Cycle, source: Choice, *, seconds: float =
         **query_figures(query_of(skill), skill.predict, skill.targets),
     }
     return replace(skill, figures=figures)
+
+
+@eqx.filter_jit
+def _seen(box: UnitBox, progress: Progress, count: int) -> tuple[Seen, Float[Array, "count space"]]:
+    """The sample of what was seen in radians and metres, and the latest test targets drawn from it [m]."""
+    q, x = box.q_from_unit(progress.seen.postures), box.x_from_unit(progress.seen.positions)
+    physical = progress.seen._replace(postures=q, positions=x)
+    return physical, draw_seen(physical, jax.random.fold_in(progress.key, 1), count)
 
 
 def evaluate(

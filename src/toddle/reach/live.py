@@ -29,6 +29,7 @@ def _propose(
 
 
 _absorb = eqx.filter_jit(loop.absorb)
+_remember = jax.jit(remember)
 
 
 def advance(setting: loop.Setting, plant: Plant, progress: loop.Progress, count: int) -> loop.Progress:
@@ -42,8 +43,8 @@ def advance(setting: loop.Setting, plant: Plant, progress: loop.Progress, count:
         unit = setting.box.x_to_unit(jnp.asarray(x, jnp.float32))
         progress, movement = _absorb(setting, progress, proposal, unit)
         movements.append(movement)
-    made = jax.tree.map(lambda *rows: jnp.stack(rows), *movements)
-    return progress._replace(seen=remember(progress.seen, for_seen, made.q, made.x), key=key)
+    q, x = (jnp.asarray(np.stack([getattr(movement, name) for movement in movements])) for name in ("q", "x"))
+    return progress._replace(seen=_remember(progress.seen, for_seen, q, x), key=key)
 
 
 def score(session: Session, progress: loop.Progress) -> loop.Scores:

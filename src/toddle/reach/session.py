@@ -21,12 +21,13 @@ from toddle.reach.config import ReachConfig
 from toddle.reach.evaluate.seen import cell_of, cells_per_axis
 from toddle.reach.evaluate.targets import fixed_targets
 from toddle.reach.explore.explorer import Home
-from toddle.reach.methods import make_explorer, make_learner, needs_equal_scales, with_method
+from toddle.reach.methods import make_explorer, make_learner, learner_named, needs_equal_scales, with_method
 from toddle.reach.observe import observer
-from toddle.reach.unit_box import around, sample_reachable
+from toddle.reach.unit_box import UnitBox, around, sample_reachable
 from toddle.robots.body import Body, Plant
 
 _SURVEY = 50_000  # postures that show a body's workspace; forward kinematics are cheap
+_LEARNED, _REMEMBERED = 300_000, 20_000  # movements to learn from: the thesis's run, and what a memory is filled with
 _TEST_POINTS = 110  # the size of the thesis's fixed set (section 4.2)
 _LIVE_SURVEY = 1_000  # the same on a plant, where each is a movement
 
@@ -50,6 +51,11 @@ class Session:
     targets: Float[np.ndarray, "points space"]
     spacing: float
     reachable_cells: jax.Array
+
+    @property
+    def samples(self) -> int:
+        """How many movements the run is to learn from."""
+        return self.config.samples or (_REMEMBERED if learner_named(self.config) == "recall" else _LEARNED)
 
     def observe(self, q: Float[np.ndarray, "batch joints"]) -> Float[np.ndarray, "batch space"]:
         """Where joint values [rad or m] bring the tip [m]; on a plant, by moving there."""
@@ -89,21 +95,19 @@ def open_session(
     config = with_method(config, len(body.joints), positions.shape[1])
     lower, upper = np.asarray(body.lower), np.asarray(body.upper)
     box = around(lower, upper, positions, isotropic=needs_equal_scales(config))
-    home = jnp.asarray(body.home, jnp.float32)
-    if isinstance(surveyed, Body):
-        home_x = surveyed.forward(home)
-    else:
-        home_x = jnp.asarray(surveyed.move(np.asarray(body.home)), jnp.float32)
-    setting = loop.Setting(
-        box,
-        Home(box.q_to_unit(home), box.x_to_unit(home_x)),
-        make_explorer(config, box),
-        make_learner(config, box, hidden),
-    )
+    home_x = observer(surveyed)(np.asarray(body.home)[None])[0]
+    home, reachable_cells = _placed(box, *(jnp.asarray(a, jnp.float32) for a in (body.home, home_x, positions)))
+    setting = loop.Setting(box, home, make_explorer(config, box), make_learner(config, box, hidden))
     targets, spacing = fixed_targets(positions, config.test_points or _TEST_POINTS, config.test_spacing)
-    cells = cells_per_axis(positions.shape[1]) ** positions.shape[1]
-    reached = cell_of(box.x_to_unit(jnp.asarray(positions, jnp.float32)))
-    return Session(config, body, setting, targets, spacing, jnp.zeros(cells, bool).at[reached].set(True))
+    return Session(config, body, setting, targets, spacing, reachable_cells)
+
+
+@eqx.filter_jit
+def _placed(box: UnitBox, q: jax.Array, x: jax.Array, positions: jax.Array) -> tuple[Home, jax.Array]:
+    """Home in the unit box, and which cells of space the survey entered."""
+    cells = cells_per_axis(len(x)) ** len(x)
+    entered = jnp.zeros(cells, bool).at[cell_of(box.x_to_unit(positions))].set(True)
+    return Home(box.q_to_unit(q), box.x_to_unit(x)), entered
 
 
 def _survey(body: Body | Plant, seed: int) -> Float[np.ndarray, "samples space"]:
@@ -149,8 +153,8 @@ def cycles(session: Session, cycle: Cycle) -> Iterator[Cycle]:
     Raises:
         ToddleError: learning diverged (a number is no longer finite).
     """
-    while cycle.samples < session.config.samples:
-        count = min(session.config.per_cycle, session.config.samples - cycle.samples)
+    while cycle.samples < session.samples:
+        count = min(session.config.per_cycle, session.samples - cycle.samples)
         if isinstance(session.body, Body):
             progress, _ = loop.advance_jit(session.setting, session.body, cycle.progress, count)
             targets = jnp.asarray(session.targets, jnp.float32)

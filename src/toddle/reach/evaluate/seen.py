@@ -81,4 +81,4 @@ def coverage(seen: Seen, reachable_cells: Bool[Array, " cells"]) -> Float[Array,
 def kept(seen: Seen) -> tuple[Float[np.ndarray, "kept joints"], Float[np.ndarray, "kept space"]]:
     """The kept postures and positions that are filled (unit box)."""
     filled = min(int(seen.total), CAPACITY)
-    return np.asarray(seen.postures[:filled]), np.asarray(seen.positions[:filled])
+    return np.asarray(seen.postures)[:filled], np.asarray(seen.positions)[:filled]
