@@ -59,6 +59,19 @@ def test_no_byte_can_be_changed(folder: Path, ending: str, share: float, bits: i
         path.write_bytes(before)
 
 
+@pytest.mark.parametrize("bits", [0x01, 0x20, 0x2A])  # the last two make capitals of letters, line ends of spaces
+def test_no_byte_at_all_of_the_facts_can_be_changed(folder: Path, bits: int) -> None:
+    path = folder / "thing.json"
+    before = path.read_bytes()
+    try:
+        for place in range(len(before)):
+            path.write_bytes(before[:place] + bytes([before[place] ^ bits]) + before[place + 1 :])
+            with pytest.raises(BadInput):
+                read_record(folder, "thing", "skill")
+    finally:
+        path.write_bytes(before)
+
+
 @given(st.sampled_from(["json", "safetensors"]), st.floats(0, 1, exclude_max=True))
 def test_no_file_can_be_cut_short(folder: Path, ending: str, share: float) -> None:
     path = folder / f"thing.{ending}"
