@@ -198,6 +198,8 @@ OPTIONS: dict[str, dict[str, str]] = {
     "--hidden": {"nan": "finite", "-3": "range", "1.5": "whole", "": "not a number", "5000": "range", "two": "not a"},
     "--method": {"goal-and-motor-babling": "did you mean", "": "empty", "x\0y": "NUL", "magic": "no method"},
     "--learner": {"perceptrn": "did you mean perceptron", "": "empty", "magic": "no learner"},
+    "--network": {"deep": "no choice", "": "no choice", "plian": "did you mean plain"},
+    "--reading": {"loose": "no choice", "": "no choice"},
     "--plant": {"gazebo": "no choice", "": "no choice", "Physics": "did you mean physics"},
     "--tip": {"": "empty", "hand": "can't be chosen"},
     "--base": {"": "empty", "floor": "can't be chosen"},
@@ -236,7 +238,7 @@ ASK: tuple[str, ...] = ("--skill", "skill", "--target", "0.5", "0.5")
 SETTLED = (
     ("--method", "motor-babbling"), ("--learner", "perceptron"), ("--seed", "1"), ("--hidden", "3"), ("--out", "new"),
     ("--learning-rate", "0.1"), ("--perturbation", "0.1"), ("--test-points", "5"), ("--test-spacing", "0.1"),
-    ("--per-cycle", "5"), ("--tip", "hand"), ("--base", "floor"), ("--joints", "turn"),
+    ("--per-cycle", "5"), ("--network", "plain"), ("--reading", "literal"), ("--tip", "hand"), ("--base", "floor"), ("--joints", "turn"),
 )  # fmt: skip
 
 WORDS: dict[str, Call] = {
@@ -269,7 +271,7 @@ WORDS: dict[str, Call] = {
     "a soft arm in physics": (("bha", "--plant", "physics"), "no physics"),
     "noise without physics": (("planar:2", "--noise", "1mm"), "only physics"),
     "noise in kinematics": (("planar:2", "--noise", "1mm", "--plant", "kinematics"), "only physics"),
-    "hidden layers of a map": (("planar:2", "--learner", "local-linear", "--hidden", "5"), ""),
+    "hidden layers of a map": (("planar:2", "--learner", "local-linear", "--hidden", "5"), "has no hidden layers"),
     "a robot and a skill": (("planar:2", *ASK), "exclude each other"),
     "a robot and a run": (("planar:2", "--resume", "run"), "exclude each other"),
     "a skill and a run": ((*ASK, "--resume", "run"), "exclude each other"),
