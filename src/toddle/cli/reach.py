@@ -41,8 +41,8 @@ class Reach:
         robot: a name (nicu, suralp, icub_arm, planar:7, planar3, scara, bha), or the path of a URDF or MJCF file.
         method: how it explores: goal-and-motor-babbling, goal-babbling, random-goal-babbling, active-goal,
             active-motor, motor-babbling or continuous-motor-babbling; what suits the arm unless given.
-        learner: what learns from it: perceptron or local-linear; the method's own unless given.
-        samples: movements to learn from; 300000 unless given, 5000 in physics.
+        learner: what learns from it: perceptron, local-linear or recall (a memory of movements); the method's own unless given.
+        samples: movements to learn from; 300000 unless given, 20000 for a memory of movements, 5000 in physics.
         seed: of all randomness.
         hidden: units of each hidden layer of the perceptron; 0 for none.
         learning_rate: step of the learner.
@@ -187,7 +187,7 @@ def _resume(asked: Reach, folder: Path) -> int:
     make_folder(folder)
     session = _open(source, config, how)
     cycle = resume(session, tensors, str(folder))
-    if cycle.samples >= config.samples:
+    if cycle.samples >= session.samples:
         raise BadInput(
             f"it has learned from all its {cycle.samples} movements",
             where=str(folder),
@@ -248,7 +248,7 @@ def _run(asked: Reach, session: Session, cycle: Cycle, source: Choice, how: dict
     facts = {"choice": asdict(source), "how": how}
     first, began = cycle.samples, time.perf_counter()
     saved = began
-    with Reporter(f"{session.body.name} learns", session.config.samples) as reporter, stoppable() as stop:
+    with Reporter(f"{session.body.name} learns", session.samples) as reporter, stoppable() as stop:
         for latest in cycles(session, cycle):
             cycle = latest
             scores = cycle.history[-1]
@@ -264,7 +264,7 @@ def _run(asked: Reach, session: Session, cycle: Cycle, source: Choice, how: dict
     save(skill, folder)
     _leave(folder, session, cycle, skill)
     _tell_figures(asked, skill, folder)
-    if cycle.samples < session.config.samples:
+    if cycle.samples < session.samples:
         print(f"toddle: stopped; go on with: toddle reach --resume {folder}", file=sys.stderr)
         return 130
     return 0
@@ -407,7 +407,7 @@ def _new_folder(out: Path | None, spec: str) -> Path:
         return make_folder(out)
     name = re.sub(r"[^\w.-]+", "-", Path(spec).stem if Path(spec).suffix else spec).strip("-") or "robot"
     number = 1
-    while (folder := Path("runs") / (name if number == 1 else f"{name}-{number}")).exists():
+    while os.path.lexists(folder := Path("runs") / (name if number == 1 else f"{name}-{number}")):
         number += 1
     return make_folder(folder)
 

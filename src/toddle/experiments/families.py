@@ -48,7 +48,7 @@ class Family:
     @property
     def complete(self) -> bool:
         """Whether nobody stopped it."""
-        return bool(self.samples[-1] >= self.session.config.samples)
+        return bool(self.samples[-1] >= self.session.samples)
 
     def best_cycle(self) -> tuple[float, float]:
         """Errors in each run's best cycle on the fixed test set, and on the seen one then; means over the runs [mm]."""
@@ -104,8 +104,8 @@ def learn_family(session: Session, seeds: int, task: Task, *, keep: Collection[i
     best, kept = jax.tree.map(lambda leaf: leaf[0], progress), {}
     samples = 0
     assert isinstance(session.body, Body)
-    while samples < config.samples and not (scores and task.stopped()):
-        count = min(config.per_cycle, config.samples - samples)
+    while samples < session.samples and not (scores and task.stopped()):
+        count = min(config.per_cycle, session.samples - samples)
         progress, score, lines = _cycle(
             session.setting, session.body, progress, count, targets, session.reachable_cells
         )
@@ -117,7 +117,7 @@ def learn_family(session: Session, seeds: int, task: Task, *, keep: Collection[i
         if samples in keep:
             kept[samples] = jax.tree.map(lambda leaf: leaf[0], progress)
         error = 1000 * float(scores[-1].fixed_error.mean())
-        task.tell(samples / config.samples, f"{samples:,} movements, error {error:.1f} mm")
+        task.tell(samples / session.samples, f"{samples:,} movements, error {error:.1f} mm")
     over = lambda name: np.stack([np.asarray(getattr(s, name), float) for s in scores], axis=1)  # noqa: E731
     return Family(
         session,

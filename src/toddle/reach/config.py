@@ -16,8 +16,8 @@ class ReachConfig:
 
     Attributes:
         method: how it explores (see `toddle.reach.methods.METHODS`); None: what suits the arm (`with_method`).
-        learner: what learns from it: perceptron or local-linear.
-        samples: how many movements to learn from.
+        learner: what learns from it: perceptron, local-linear or recall.
+        samples: how many movements to learn from; 300,000, or 20,000 for a memory of movements.
         seed: of all randomness.
         hidden: hidden layers of the perceptron; () is the single-layer perceptron.
         learning_rate: step of the learner.
@@ -33,7 +33,7 @@ class ReachConfig:
 
     method: str | None = None
     learner: str | None = None
-    samples: int = 300_000
+    samples: int | None = None
     seed: int = 0
     hidden: tuple[int, ...] | None = None
     learning_rate: float | None = None
@@ -50,7 +50,7 @@ class ReachConfig:
         Raises:
             BadInput: a number out of its range.
         """
-        _within("samples", self.samples, 1, MOST_SAMPLES)
+        _within("samples", 1 if self.samples is None else self.samples, 1, MOST_SAMPLES)
         _within("seed", self.seed, 0, 2**32 - 1)
         _within("per-cycle", self.per_cycle, 1, 1_000_000)
         _within("test-points", 110 if self.test_points is None else self.test_points, 1, 10_000)

@@ -18,6 +18,7 @@ from toddle.reach.explore.motor import ContinuousMotorBabbling, MotorBabbling
 from toddle.reach.learn.learner import Learner
 from toddle.reach.learn.local_linear import local_linear_map
 from toddle.reach.learn.perceptron import Perceptron, refined
+from toddle.reach.learn.recall import Recall
 from toddle.reach.unit_box import UnitBox
 
 _RANDOM_REGION = 0.3  # how often an active method goes to a region at random (Moulin-Frier 2013)
@@ -43,7 +44,8 @@ class Method:
 
 
 def _goal_and_motor(config: ReachConfig, box: UnitBox) -> Explorer:
-    size = jnp.float32(_or(config.perturbation, 0.233))
+    # a memory has an answer of its own for every place it saw, and is best served by small steps
+    size = jnp.float32(_or(config.perturbation, 0.03 if learner_named(config) == "recall" else 0.233))
     return (
         GoalAndMotorBabbling(size, ends="all", stall=0.0) if config.reading == "literal" else GoalAndMotorBabbling(size)
     )
@@ -76,7 +78,11 @@ def _active_motor(config: ReachConfig, box: UnitBox) -> Explorer:
 
 
 def _local_linear(config: ReachConfig, box: UnitBox, hidden: tuple[int, ...]) -> Learner:
-    return local_linear_map(len(box.space_span), learning_rate=_or(config.learning_rate, 0.1))
+    return local_linear_map(len(box.space_span), learning_rate=_or(config.learning_rate, 0.3))
+
+
+def _recall(config: ReachConfig, box: UnitBox, hidden: tuple[int, ...]) -> Learner:
+    return Recall()
 
 
 def _perceptron(config: ReachConfig, box: UnitBox, hidden: tuple[int, ...]) -> Learner:
@@ -141,14 +147,16 @@ METHODS: Mapping[str, Method] = {method.name: method for method in _METHODS}
 LEARNERS: Mapping[str, Callable[[ReachConfig, UnitBox, tuple[int, ...]], Learner]] = {
     "perceptron": _perceptron,
     "local-linear": _local_linear,
+    "recall": _recall,
 }
 
 
 def with_method(config: ReachConfig, joints: int, space: int) -> ReachConfig:
-    """The configuration with a method, where it names none; and with the perceptron, where it names hidden layers.
+    """The configuration with what suits the arm, where it names nothing.
 
-    With one joint to spare at most, goal and motor babbling learns quickest. With more, postures that it visits for one
-    position differ so much that their mean is none of them; goal babbling keeps to one way of reaching.
+    With one joint to spare at most, the perceptron learns from goal and motor babbling as in the thesis. With more, the
+    postures visited for one position differ so much that their mean is none of them: what was experienced is remembered
+    instead of averaged over (`recall`). Hidden layers ask for the perceptron.
 
     Args:
         config: the run's configuration.
@@ -157,9 +165,10 @@ def with_method(config: ReachConfig, joints: int, space: int) -> ReachConfig:
     """
     if config.learner is None and config.hidden is not None:
         config = replace(config, learner="perceptron")
-    if config.method is not None:
-        return config
-    return replace(config, method="goal-and-motor-babbling" if joints <= space + 1 else "goal-babbling")
+    if config.method is None:
+        learner = config.learner or ("perceptron" if joints <= space + 1 else "recall")
+        config = replace(config, method="goal-and-motor-babbling", learner=learner)
+    return config
 
 
 def method_named(name: str | None) -> Method:
@@ -213,4 +222,4 @@ def _or(value: float | None, default: float) -> float:
 
 def needs_equal_scales(config: ReachConfig) -> bool:
     """Whether the learner measures distances in space, so that one scale must serve all axes."""
-    return learner_named(config) == "local-linear"
+    return learner_named(config) in ("local-linear", "recall")

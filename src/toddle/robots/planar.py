@@ -9,6 +9,7 @@ import math
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from toddle.failures import BadInput
 from toddle.robots.chain import Chain
@@ -25,8 +26,10 @@ def planar(n: int, *, limit: float = math.pi / 2, length: float = 1.0) -> Chain:
         length: of the whole arm [m].
 
     Returns:
-        A chain whose tip has two coordinates; its home is a slight bend, 0.3 pi / N a joint (or half the
-        limit, if less), away from the straight arm, where the tip can't move outwards.
+        A chain whose tip has two coordinates. Its home is an arc: the base turned by -1.1 rad and the other joints
+        bent by 2.2 rad together (less where the limits are narrow), so that the tip points ahead and can move in
+        every direction. Goal babbling keeps to the way of bending that its home shows: from a nearly straight home it
+        is much worse.
 
     Raises:
         BadInput: n is not from 1 to 200, or the limit or length is not positive.
@@ -45,7 +48,7 @@ def planar(n: int, *, limit: float = math.pi / 2, length: float = 1.0) -> Chain:
         joints=tuple(f"joint_{i + 1}" for i in range(n)),
         lower=jnp.full(n, -limit, jnp.float32),
         upper=jnp.full(n, limit, jnp.float32),
-        home=jnp.full(n, min(0.3 * math.pi / n, limit / 2), jnp.float32),
+        home=_arc(n, limit),
         before=jnp.asarray(before),
         slides=jnp.zeros(n, jnp.float32),
         gain=jnp.eye(n, dtype=jnp.float32),
@@ -53,3 +56,8 @@ def planar(n: int, *, limit: float = math.pi / 2, length: float = 1.0) -> Chain:
         tip=jnp.asarray(link),
         coordinates=(0, 1),
     )
+
+
+def _arc(n: int, limit: float) -> Float[Array, " joints"]:
+    bend = min(2.2 / max(n - 1, 1), limit / 2)
+    return jnp.full(n, bend, jnp.float32).at[0].set(-min(1.1, limit / 2))
