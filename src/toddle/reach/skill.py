@@ -27,6 +27,7 @@ from toddle.robots.catalogue import Choice
 from toddle.signals import Solution, Verdict
 
 _NEIGHBOURS = 5  # held-out errors averaged for the error to expect
+_BATCH = 512  # targets answered at once: a memory compares each with all that it holds
 _AT_LIMIT = 1e-3  # a joint closer to its limit than this share of its range stands at it
 _FARTHEST = 1e6  # [m]
 _GAP = 3.0  # a target this many typical gaps away from everything visited is out of reach
@@ -92,7 +93,7 @@ class Skill:
 
 @eqx.filter_jit
 def _predict(box: UnitBox, learner: Learner, state: object, targets: Array) -> Array:
-    units = jax.vmap(lambda x: learner.answer(state, x))(box.x_to_unit(targets))
+    units = jax.lax.map(lambda x: learner.answer(state, x), box.x_to_unit(targets), batch_size=_BATCH)
     return box.q_from_unit(jnp.clip(units, 0.0, 1.0))
 
 
