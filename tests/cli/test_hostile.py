@@ -238,7 +238,8 @@ ASK: tuple[str, ...] = ("--skill", "skill", "--target", "0.5", "0.5")
 SETTLED = (
     ("--method", "motor-babbling"), ("--learner", "perceptron"), ("--seed", "1"), ("--hidden", "3"), ("--out", "new"),
     ("--learning-rate", "0.1"), ("--perturbation", "0.1"), ("--test-points", "5"), ("--test-spacing", "0.1"),
-    ("--per-cycle", "5"), ("--network", "plain"), ("--reading", "literal"), ("--tip", "hand"), ("--base", "floor"), ("--joints", "turn"),
+    ("--per-cycle", "5"), ("--network", "plain"), ("--reading", "literal"),
+    ("--tip", "hand"), ("--base", "floor"), ("--joints", "turn"),
 )  # fmt: skip
 
 WORDS: dict[str, Call] = {

@@ -83,5 +83,5 @@ def test_the_smallest_run_has_its_picture_and_it_is_not_blank(draw: Callable[[Pa
     image = matplotlib.image.imread(tmp_path / "a.png")
     assert image.shape[0] > 300
     assert image.shape[1] > 300
-    assert len(np.unique(image[..., :3].reshape(-1, 3), axis=0)) > 5
+    assert len(np.unique(image[::5, ::5, :3].reshape(-1, 3), axis=0)) > 5
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.png"]
