@@ -28,9 +28,7 @@ def test_a_tree_that_keeps_the_design_has_no_fault(tmp_path: Path) -> None:
     _plant(tmp_path, "robots/body.py", "from toddle.signals import Movement\nimport mujoco")
     _plant(tmp_path, "signals.py", "from toddle.failures import BadInput\nfrom .geometry import frames")
     _plant(tmp_path, "geometry/frames.py", "text = 'pickle'.replace('a', 'b')")
-    _plant(
-        tmp_path, "outside/pictures.py", "import matplotlib.pyplot\nfrom toddle.reach import loop\nprint(1)"
-    )
+    _plant(tmp_path, "outside/pictures.py", "import matplotlib.pyplot\nfrom toddle.reach import loop\nprint(1)")
     _plant(tmp_path, "failures.py", "")
     assert faults(tmp_path) == []
 

@@ -2,7 +2,7 @@
 
     robot = toddle.load("nicu")
     skill = toddle.learn(robot, samples=20_000, seed=0)
-    answer = toddle.solve(skill, [0.25, -0.25, 0.75])
+    answer = toddle.solve(skill, [0.2, -0.4, 0.6])
 
 Names are resolved when they are first used, so that importing the package costs nothing.
 """

@@ -34,9 +34,7 @@ def place(position: Any, angles: Any = (0.0, 0.0, 0.0)) -> np.ndarray:
     return pose
 
 
-def chain(
-    before: Any, tip: Any, *, half: Any, slides: Any = None, gain: Any = None, offset: Any = None
-) -> Chain:
+def chain(before: Any, tip: Any, *, half: Any, slides: Any = None, gain: Any = None, offset: Any = None) -> Chain:
     """A chain with limits of plus or minus `half`; without a gain, every axis is a joint."""
     axes, half = len(before), np.asarray(half, float)
 
@@ -61,8 +59,7 @@ def random_chain(seed: int, axes: int, *, mimic: bool = False) -> Chain:
     """Turning and sliding axes in any direction, some meeting in one point; a mimic axis if asked."""
     random = np.random.default_rng(seed)
     before = [
-        place(random.normal(size=3) * 0.1 * (random.random() < 0.8), random.uniform(-3, 3, 3))
-        for _ in range(axes)
+        place(random.normal(size=3) * 0.1 * (random.random() < 0.8), random.uniform(-3, 3, 3)) for _ in range(axes)
     ]
     slides = random.random(axes) < 0.3
     half = np.where(slides, 0.1, random.uniform(0.3, 2.0, axes))
@@ -70,9 +67,7 @@ def random_chain(seed: int, axes: int, *, mimic: bool = False) -> Chain:
     if mimic:
         half, gain, offset[-1] = half[:-1], np.eye(axes)[:, :-1], 0.2
         gain[-1] = random.uniform(-1, 1, axes - 1)
-    return chain(
-        before, place(random.normal(size=3) * 0.1), half=half, slides=slides, gain=gain, offset=offset
-    )
+    return chain(before, place(random.normal(size=3) * 0.1), half=half, slides=slides, gain=gain, offset=offset)
 
 
 def forward(arm: Chain, q: np.ndarray) -> np.ndarray:
@@ -200,9 +195,7 @@ def test_no_mode_of_the_servoed_arm_oscillates_or_is_slow() -> None:
         mujoco.mj_fwdVelocity(plant.model, data)
         mujoco.mj_fullM(plant.model, data, matrix)
         inverse = np.linalg.inv(matrix)
-        motion = np.block(
-            [[np.zeros((4, 4)), np.eye(4)], [-inverse @ np.diag(stiffness), -inverse @ np.diag(damping)]]
-        )
+        motion = np.block([[np.zeros((4, 4)), np.eye(4)], [-inverse @ np.diag(stiffness), -inverse @ np.diag(damping)]])
         roots = np.linalg.eigvals(motion)
         assert np.abs(roots.imag).max() < 0.01 * frequency
         assert roots.real.max() < -0.49 * frequency
@@ -273,9 +266,7 @@ def test_an_interrupted_run_goes_on_bit_for_bit(friction: float) -> None:
 
 def test_another_arms_state_is_refused() -> None:
     state = nicu().state()
-    with pytest.raises(
-        BadInput, match="test arm: the state's 'physics' is missing, or another arm's; restore it"
-    ):
+    with pytest.raises(BadInput, match="test arm: the state's 'physics' is missing, or another arm's; restore it"):
         single_link().restore(state)
     with pytest.raises(BadInput, match="the state's 'random' is missing"):
         nicu().restore({name: state[name] for name in ("physics", "moves")})

@@ -41,7 +41,8 @@ class Reach:
         robot: a name (nicu, suralp, icub_arm, planar:7, planar3, scara, bha), or the path of a URDF or MJCF file.
         method: how it explores: goal-and-motor-babbling, goal-babbling, random-goal-babbling, active-goal,
             active-motor, motor-babbling or continuous-motor-babbling; what suits the arm unless given.
-        learner: what learns from it: perceptron, local-linear or recall (a memory of movements); the method's own unless given.
+        learner: what learns from it: perceptron, local-linear or recall (a memory of movements); the method's own
+            unless given.
         samples: movements to learn from; 300000 unless given, 20000 for a memory of movements, 5000 in physics.
         seed: of all randomness.
         hidden: units of each hidden layer of the perceptron; 0 for none.
@@ -170,6 +171,10 @@ def _learn(asked: Reach) -> int:
     how = _how(asked)
     _refuse_used(asked.out)
     session = _open(source, suited(config, source.spec), how)
+    if config.method is None:
+        spare = len(session.body.joints) - session.targets.shape[1]
+        took = f"{session.config.method} with the learner {session.config.learner}"
+        print(f"toddle: {session.body.name} has {spare} joints to spare: {took}", file=sys.stderr)
     folder = _new_folder(asked.out, source.spec)
     from toddle.reach.session import start
 

@@ -18,6 +18,7 @@ from toddle.reach.config import ReachConfig
 from toddle.reach.evaluate.figures import error_figures, errors_of, query_figures
 from toddle.reach.evaluate.seen import Seen, draw_seen, kept
 from toddle.reach.loop import Progress
+from toddle.reach.methods import learner_named
 from toddle.reach.observe import observer
 from toddle.reach.session import Cycle, Session, cycles, open_session, start
 from toddle.reach.skill import Skill
@@ -100,6 +101,7 @@ def skill_of(session: Session, cycle: Cycle, source: Choice, *, seconds: float =
     figures = {
         "robot": session.body.name,
         "method": session.config.method,
+        "learner": learner_named(session.config),
         "samples": cycle.samples,
         "seed": session.config.seed,
         **error_figures("fixed_error", errors),

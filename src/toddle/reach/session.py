@@ -21,7 +21,7 @@ from toddle.reach.config import ReachConfig
 from toddle.reach.evaluate.seen import cell_of, cells_per_axis
 from toddle.reach.evaluate.targets import fixed_targets
 from toddle.reach.explore.explorer import Home
-from toddle.reach.methods import make_explorer, make_learner, learner_named, needs_equal_scales, with_method
+from toddle.reach.methods import learner_named, make_explorer, make_learner, needs_equal_scales, with_method
 from toddle.reach.observe import observer
 from toddle.reach.unit_box import UnitBox, around, sample_reachable
 from toddle.robots.body import Body, Plant
