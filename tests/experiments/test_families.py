@@ -9,6 +9,7 @@ import pytest
 from tiny import session
 
 from toddle.experiments import mahboob_planar5 as planar5
+from toddle.experiments import rolf_direction_sampling as rolf
 from toddle.experiments.capacity import capacity
 from toddle.experiments.experiment import Task
 from toddle.experiments.families import Family, errors_point_by_point, learn_family, open_for
@@ -101,3 +102,23 @@ def test_the_planar_arm_from_end_to_end(monkeypatch: pytest.MonkeyPatch, tmp_pat
     assert 0 < first < second < 50  # 200 movements can enter 200 cells of some 1,000
     assert not outcome.holds
     assert {path.name for path in tmp_path.iterdir()} == {"figure-a-3-a-4.png", "figure-a-5-a-8.png"}
+
+
+@pytest.mark.parametrize("joints", [5, 50])
+def test_the_bent_arm_points_straight_ahead_within_its_limits(joints: int):
+    bent = rolf.arm(joints, rolf.FULL)
+    reach, sideways = np.asarray(bent.forward(bent.home))
+    assert sideways == pytest.approx(0.0, abs=1e-5)
+    assert 0.3 < reach < 0.95
+    assert np.all((np.asarray(bent.home) > np.asarray(bent.lower)) & (np.asarray(bent.home) < np.asarray(bent.upper)))
+    assert np.sum(np.asarray(bent.home)[1:]) == pytest.approx(0.9 * np.pi * (joints - 1) / joints, rel=1e-5)
+
+
+def test_the_goals_lie_on_their_ring():
+    goals = rolf.goals_on_a_ring(rolf.FULL, seed=0)
+    assert len(goals) == 110
+    distance, angle = np.linalg.norm(goals, axis=1), np.arctan2(goals[:, 1], goals[:, 0])
+    assert np.all((distance >= 0.3) & (distance <= 0.95))
+    assert np.all(np.abs(angle) <= 2.0)
+    assert angle.min() < -1.5
+    assert angle.max() > 1.5

@@ -5,8 +5,8 @@ slowly. Mahboob 2015 (4.1) reports of Rolf's experiment that "the approach works
 DOF" and converges after "almost 1.000.000 examples"; the arms are one metre long. The papers' figures are curves: no
 number is printed that could stand beside ours, so ours stand beside what we ask of them.
 
-Going home at four line ends in ten, and quickly, is ours (Rolf: one in ten): judged on other seeds, it keeps the arm to
-one way of reaching. Joint ranges, home and test goals are ours too: a base that turns by 2.5 rad to each side, all others by 90 degrees; a
+Going home at four line ends in ten, and quickly, is ours (Rolf: one in ten): it keeps the arm to one way of reaching.
+Joint ranges, home and test goals are ours too: a base that turns by 2.5 rad to each side, all others by 90 degrees; a
 home that is bent, lest it lie at the edge of what can be reached; goals 0.3 to 0.95 m away, up to 2 rad to each side.
 """
 
