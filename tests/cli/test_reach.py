@@ -87,7 +87,8 @@ def test_json_is_one_object_and_nothing_else(reach: Run, tmp_path: Path) -> None
     assert json.loads((tmp_path / "run" / "figures.json").read_text()) == {
         name: value for name, value in figures.items() if name != "folder"
     }
-    assert re.fullmatch(r"(planar:2 learns: \d+ of 200, error [\d.]+ mm\n)+", err)
+    took = "planar:2: 2 joints for 2 coordinates, so goal-and-motor-babbling, learner perceptron\n"
+    assert re.fullmatch(re.escape(took) + r"(planar:2 learns: \d+ of 200, error [\d.]+ mm\n)+", err)
 
 
 def test_a_run_leaves_a_folder_with_all_of_it(folder: Path) -> None:
@@ -150,7 +151,7 @@ def test_a_run_that_was_stopped_goes_on_bit_for_bit(
         code, out, err = reach("planar:2", "--samples=1000", *SIZES, "--out", stopped, "--json")
     assert code == 130
     assert json.loads(out)["samples"] == 400
-    assert err == f"toddle: stopped; go on with: toddle reach --resume {stopped}\n"
+    assert err.endswith(f"\ntoddle: stopped; go on with: toddle reach --resume {stopped}\n")
     assert toddle.load_skill(stopped).figures["samples"] == 400
     code, out, _ = reach("--resume", stopped, "--json")
     assert code == 0
@@ -166,6 +167,7 @@ def test_ctrl_c_stops_a_real_process_and_loses_nothing(reach: Run, tmp_path: Pat
     command = [sys.executable, "-c", script, *words]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
+        assert process.stderr.readline().startswith("planar:2: 2 joints for 2 coordinates")
         first = process.stderr.readline()
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=60)

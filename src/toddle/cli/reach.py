@@ -157,7 +157,7 @@ def _learn(asked: Reach) -> int:
     from toddle.reach.api import suited
     from toddle.reach.config import ReachConfig
     from toddle.reach.methods import learner_named, with_method
-    from toddle.robots.catalogue import Choice
+    from toddle.robots.catalogue import Choice, settled
 
     given = {name: getattr(asked, name) for name in _OF_A_RUN if getattr(asked, name) is not None}
     if asked.plant == "physics":
@@ -167,15 +167,15 @@ def _learn(asked: Reach) -> int:
         given["hidden"] = ()
     config = ReachConfig(**given)
     learner_named(with_method(config, 0, 0))
-    source = Choice(asked.robot or "", asked.tip, asked.base, asked.joints)
+    source = settled(Choice(asked.robot or "", asked.tip, asked.base, asked.joints))
     how = _how(asked)
     _refuse_used(asked.out)
     session = _open(source, suited(config, source.spec), how)
-    if config.method is None:
-        spare = len(session.body.joints) - session.targets.shape[1]
-        took = f"{session.config.method} with the learner {session.config.learner}"
-        print(f"toddle: {session.body.name} has {spare} joints to spare: {took}", file=sys.stderr)
     folder = _new_folder(asked.out, source.spec)
+    if config.method is None:
+        size = f"{len(session.body.joints)} joints for {session.targets.shape[1]} coordinates"
+        took = f"{session.config.method}, learner {session.config.learner}"
+        print(f"{session.body.name}: {size}, so {took}", file=sys.stderr)
     from toddle.reach.session import start
 
     return _run(asked, session, start(session), source, how, folder)
@@ -248,24 +248,22 @@ def _run(asked: Reach, session: Session, cycle: Cycle, source: Choice, how: dict
     from toddle.outside.skills import save, save_run
     from toddle.outside.terminal import Reporter, stoppable
     from toddle.reach.api import skill_of
-    from toddle.reach.session import cycles
+    from toddle.reach.session import Pace, cycles
 
     facts = {"choice": asdict(source), "how": how}
-    first, began = cycle.samples, time.perf_counter()
-    saved = began
+    pace, saved = Pace(cycle.samples), time.perf_counter()
     with Reporter(f"{session.body.name} learns", session.samples) as reporter, stoppable() as stop:
         for latest in cycles(session, cycle):
             cycle = latest
-            scores = cycle.history[-1]
-            reporter.tell(cycle.samples, f"error {1000 * float(scores.fixed_error):.1f} mm")
+            pace.tick(cycle.samples)
+            reporter.tell(cycle.samples, f"error {1000 * float(cycle.history[-1].fixed_error):.1f} mm")
             if time.perf_counter() - saved > _SAVE_SECONDS:
                 save_run(folder, session, cycle, facts)
                 saved = time.perf_counter()
             if stop.asked:
                 break
-    seconds = time.perf_counter() - began
     save_run(folder, session, cycle, facts)
-    skill = skill_of(session, cycle, source, seconds=seconds * cycle.samples / max(cycle.samples - first, 1))
+    skill = skill_of(session, cycle, source, pace=pace)
     save(skill, folder)
     _leave(folder, session, cycle, skill)
     _tell_figures(asked, skill, folder)

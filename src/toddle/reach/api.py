@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Literal, TypedDict, Unpack
@@ -20,12 +19,12 @@ from toddle.reach.evaluate.seen import Seen, draw_seen, kept
 from toddle.reach.loop import Progress
 from toddle.reach.methods import learner_named
 from toddle.reach.observe import observer
-from toddle.reach.session import Cycle, Session, cycles, open_session, start
+from toddle.reach.session import Cycle, Pace, Session, cycles, open_session, start
 from toddle.reach.skill import Skill
 from toddle.reach.solve.query import query_of
 from toddle.reach.unit_box import UnitBox
 from toddle.robots.body import Body, Plant
-from toddle.robots.catalogue import Choice, load, load_choice, record
+from toddle.robots.catalogue import Choice, load, load_choice, record, settled
 
 LOOKS = 3
 
@@ -69,25 +68,25 @@ def learn(
             raise unknown_name("option", name, known, where="learn")
     body = load(robot) if isinstance(robot, str) else robot
     session = open_session(body, suited(ReachConfig(**options), body.name), hidden=hidden_of(body.name))
-    began = time.perf_counter()
     cycle = start(session)
+    pace = Pace(0)
     for latest in cycles(session, cycle):
         cycle = latest
+        pace.tick(cycle.samples)
         if on_cycle is not None:
             on_cycle(cycle)
-    seconds = time.perf_counter() - began
-    source = Choice(robot if isinstance(robot, str) else body.name)
-    return skill_of(session, cycle, source, seconds=seconds)
+    source = settled(Choice(robot if isinstance(robot, str) else body.name))
+    return skill_of(session, cycle, source, pace=pace)
 
 
-def skill_of(session: Session, cycle: Cycle, source: Choice, *, seconds: float = 0.0) -> Skill:
+def skill_of(session: Session, cycle: Cycle, source: Choice, *, pace: Pace) -> Skill:
     """The skill that a run has come to, evaluated.
 
     Args:
         session: the run.
         cycle: how far it came.
         source: what `toddle.load` makes the body from.
-        seconds: how long learning took, for the figures [s].
+        pace: how quickly, for the figures.
     """
     progress, setting = cycle.progress, session.setting
     physical, drawn = _seen(setting.box, progress, len(session.targets))
@@ -110,7 +109,7 @@ def skill_of(session: Session, cycle: Cycle, source: Choice, *, seconds: float =
         "coverage_percent": 100 * float(cycle.history[-1].coverage) if cycle.history else 0.0,
         "test_points": len(session.targets),
         "test_spacing_mm": 1000 * session.spacing,
-        "samples_per_second": cycle.samples / seconds if seconds else 0.0,
+        "samples_per_second": pace.per_second,
         **query_figures(query_of(skill), skill.predict, skill.targets),
     }
     return replace(skill, figures=figures)

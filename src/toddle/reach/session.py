@@ -6,6 +6,7 @@ taken up again from its configuration and its saved `Progress` alone, bit for bi
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -169,3 +170,24 @@ def cycles(session: Session, cycle: Cycle) -> Iterator[Cycle]:
             )
         cycle = Cycle(progress, (*cycle.history, jax.tree.map(np.asarray, scores)))
         yield cycle
+
+
+class Pace:
+    """How many movements a second are learned from, once everything is compiled: from the first cycle on."""
+
+    def __init__(self, samples: int) -> None:
+        self._start = self._first = self._last = (samples, time.perf_counter())
+        self._cycles = 0
+
+    def tick(self, samples: int) -> None:
+        """A cycle has ended after so many movements."""
+        self._last = (samples, time.perf_counter())
+        self._cycles += 1
+        if self._cycles == 1:
+            self._first = self._last
+
+    @property
+    def per_second(self) -> float:
+        """Movements a second; with a single cycle, compiling included."""
+        (before, began), (after, ended) = self._first if self._cycles > 1 else self._start, self._last
+        return (after - before) / max(ended - began, 1e-9)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -83,6 +83,13 @@ def load_choice(choice: Choice) -> Body:
     if _looks_like_a_file(choice.spec):
         return _read(Path(choice.spec), choice)
     return _from_descriptions(choice)
+
+
+def settled(choice: Choice) -> Choice:
+    """What was asked for, to be found again from any folder: a file by its whole path."""
+    if record(choice.spec) is None and os.path.exists(choice.spec):
+        return replace(choice, spec=str(Path(choice.spec).resolve()))
+    return choice
 
 
 def record(spec: str) -> Robot | None:
