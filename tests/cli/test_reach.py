@@ -94,7 +94,7 @@ def test_json_is_one_object_and_nothing_else(reach: Run, tmp_path: Path) -> None
 def test_a_run_leaves_a_folder_with_all_of_it(folder: Path) -> None:
     assert {path.name for path in folder.iterdir()} == {
         "config.json", "figures.json", "course.json", "run.json", "run.safetensors", "skill.json", "skill.safetensors",
-        "error.png", "explored.png", "targets.png",
+        "error.png", "explored.png", "coverage.png", "fixed.png", "seen.png", "points.json",
     }  # fmt: skip
     config = json.loads((folder / "config.json").read_text())
     assert (config["source"]["spec"], config["samples"], config["hidden"]) == ("planar:2", 400, [4])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import re
 import sys
 import time
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from toddle.cli.arguments import parse
 from toddle.cli.options import POSITIONAL
+from toddle.cli.run_folder import leave, new_folder, refuse_used, tell_figures
 from toddle.failures import BadInput
 
 if TYPE_CHECKING:
@@ -104,10 +104,6 @@ _TAKES = {  # the options that each way of calling has, beside --json
     "resume": {"samples"},
     "skill": {"target", "looks", "tolerance", "plant", "noise"},
 }
-_FILES = (
-    "run.json", "run.safetensors", "skill.json", "skill.safetensors", "config.json", "figures.json", "course.json",
-    "error.png", "explored.png", "targets.png",
-)  # fmt: skip
 
 
 def main(argv: Sequence[str]) -> int:
@@ -169,9 +165,9 @@ def _learn(asked: Reach) -> int:
     learner_named(with_method(config, 0, 0))
     source = settled(Choice(asked.robot or "", asked.tip, asked.base, asked.joints))
     how = _how(asked)
-    _refuse_used(asked.out)
+    refuse_used(asked.out)
     session = _open(source, suited(config, source.spec), how)
-    folder = _new_folder(asked.out, source.spec)
+    folder = new_folder(asked.out, source.spec)
     if config.method is None:
         size = f"{len(session.body.joints)} joints for {session.targets.shape[1]} coordinates"
         took = f"{session.config.method}, learner {session.config.learner}"
@@ -265,75 +261,12 @@ def _run(asked: Reach, session: Session, cycle: Cycle, source: Choice, how: dict
     save_run(folder, session, cycle, facts)
     skill = skill_of(session, cycle, source, pace=pace)
     save(skill, folder)
-    _leave(folder, session, cycle, skill)
-    _tell_figures(asked, skill, folder)
+    leave(folder, session, cycle, skill)
+    tell_figures(skill, folder, as_json=asked.json)
     if cycle.samples < session.samples:
         print(f"toddle: stopped; go on with: toddle reach --resume {folder}", file=sys.stderr)
         return 130
     return 0
-
-
-def _leave(folder: Path, session: Session, cycle: Cycle, skill: Skill) -> None:
-    """The rest of the run's folder: configuration, figures, the course of learning, pictures."""
-    import numpy as np
-
-    from toddle.outside import pictures
-    from toddle.outside.files import write_json
-    from toddle.outside.versions import versions
-    from toddle.robots.catalogue import record
-
-    write_json(
-        folder / "config.json",
-        {"source": asdict(skill.source), **asdict(skill.config), "versions": versions()},
-    )
-    write_json(folder / "figures.json", skill.figures)
-    course = {name: [float(getattr(s, name)) for s in cycle.history] for name in cycle.history[0]._fields}
-    write_json(folder / "course.json", course)
-    known = record(skill.source.spec)
-    published = dict(known.published) if known and skill.config.method == "goal-and-motor-babbling" else {}
-    title = f"{session.body.name}, {skill.config.method}"
-    pictures.error_over_samples(
-        folder / "error.png",
-        [int(n) for n in course["samples"]],
-        [1000 * e for e in course["fixed_error"]],
-        [1000 * e for e in course["seen_error"]],
-        title=f"{title}: error over movements",
-        published=published,
-    )
-    base = np.zeros(skill.seen.shape[1])
-    pictures.explored_space(folder / "explored.png", skill.seen, base, title=f"{title}: explored space")
-    pictures.targets_by_error(folder / "targets.png", skill.targets, skill.errors, title=f"{title}: fixed test set")
-
-
-def _tell_figures(asked: Reach, skill: Skill, folder: Path) -> None:
-    """The figures on standard output: one JSON object, or a table beside the document's."""
-    from toddle.outside.files import finite
-    from toddle.outside.terminal import print_table
-    from toddle.robots.catalogue import record
-
-    if asked.json:
-        print(json.dumps(finite({**skill.figures, "folder": str(folder)})))
-        return
-    known = record(skill.source.spec)
-    published = known.published if known and skill.config.method == "goal-and-motor-babbling" else {}
-    rows = [
-        [name.replace("_", " "), _figure(value), _figure(published[name]) if name in published else ""]
-        for name, value in skill.figures.items()
-    ]
-    print_table(
-        f"{skill.figures['robot']} after {skill.figures['samples']} movements",
-        ("", "this run", "document"),
-        rows,
-    )
-    print(f"figures, pictures and the skill: {folder}")
-    middle = " ".join(f"{value:.3f}" for value in skill.targets[len(skill.targets) // 2])
-    print(f"ask it: toddle reach --skill {folder} --target {middle}")
-
-
-def _figure(value: object) -> str:
-    if isinstance(value, float):
-        return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.2f}"
-    return str(value)
 
 
 def _answer(asked: Reach, folder: Path) -> int:
@@ -383,36 +316,6 @@ def _turning(body: Body | None, skill: Skill) -> list[bool]:
     if not isinstance(body, Chain):
         return [False] * len(skill.joints)
     return [not any(body.slides[body.gain[:, joint] != 0]) for joint in range(len(skill.joints))]
-
-
-def _refuse_used(out: Path | None) -> None:
-    """Refuse a folder in which a new run would write over something."""
-    if out is None:
-        return
-    if os.path.lexists(out) and not os.path.isdir(out):
-        raise BadInput("it is no folder", where=f"--out {out}", remedy="name another")
-    found = [name for name in _FILES if os.path.lexists(out / name)]
-    if found and found[0] == "run.json":
-        raise BadInput("it holds a run already", where=str(out), remedy=f"go on with --resume {out}, or name another")
-    if found:
-        raise BadInput(f"its {found[0]} would be written over", where=str(out), remedy="name another with --out")
-
-
-def _new_folder(out: Path | None, spec: str) -> Path:
-    """The folder that a new run writes into.
-
-    Raises:
-        BadInput: it can't be made, or nothing can be written into it.
-    """
-    from toddle.outside.files import make_folder
-
-    if out is not None:
-        return make_folder(out)
-    name = re.sub(r"[^\w.-]+", "-", Path(spec).stem if Path(spec).suffix else spec).strip("-") or "robot"
-    number = 1
-    while os.path.lexists(folder := Path("runs") / (name if number == 1 else f"{name}-{number}")):
-        number += 1
-    return make_folder(folder)
 
 
 def _metres(length: str | None) -> float | None:

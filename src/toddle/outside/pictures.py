@@ -12,7 +12,7 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from matplotlib.figure import Figure
 
 from toddle.outside.files import write_bytes
@@ -80,15 +80,52 @@ def error_over_samples(
 
 
 def explored_space(
-    path: Path, seen: Float[np.ndarray, "kept space"], base: Float[np.ndarray, " space"], *, title: str
+    path: Path, seen: Float[np.ndarray, "kept space"], home: Float[np.ndarray, " space"], *, title: str
 ) -> None:
-    """Positions that the tip visited [m] (figures 4.7, 4.10, 5.8, A.5-A.8)."""
+    """Positions that the tip visited, and where it started [m] (figures 4.7, 4.10, 5.8, A.5-A.8)."""
     figure = new_figure(6.4, 5.4)
     axes = _space_axes(figure, seen.shape[1])
     axes.scatter(*seen.T, s=3, color=OURS, alpha=0.35, linewidths=0)
-    axes.scatter(*base, s=40, color=THEIRS, label="base of the arm")
+    axes.scatter(*home, s=40, color=THEIRS, label="home")
     axes.set_title(title)
     axes.legend(frameon=False, loc="upper right")
+    save_figure(figure, path)
+
+
+def coverage(
+    path: Path,
+    samples: Sequence[int],
+    covered: Sequence[float],
+    visited: Bool[np.ndarray, " cells"],
+    reachable: Bool[np.ndarray, " cells"],
+    space: int,
+    *,
+    title: str,
+) -> None:
+    """How much of the reachable space was visited: over the movements made, and where, seen from above.
+
+    Args:
+        path: the PNG to write.
+        samples: movements at each test.
+        covered: the share of the reachable cells that were visited, 0 to 1.
+        visited, reachable: the cells of the grid over the workspace, x fastest.
+        space: coordinates of a position.
+        title: says robot and method.
+    """
+    figure = new_figure(10.0, 4.4)
+    left = plain_axes(figure, 121)
+    left.plot(samples, [100 * share for share in covered], color=OURS, lw=1.4)
+    left.set(xlabel="movements", ylabel="visited [% of the reachable cells]", ylim=(0, 102), title=title)
+    left.set_xlim(0, max(samples, default=1))
+    size = round(len(reachable) ** (1 / space))
+    columns = tuple(grid.reshape((size,) * space).reshape(-1, size, size) for grid in (visited & reachable, reachable))
+    seen, there = (grid.sum(axis=0) for grid in columns)
+    share = np.where(there > 0, 100 * seen / np.maximum(there, 1), np.nan)
+    right = plain_axes(figure, 122)
+    right.grid(visible=False)
+    image = right.imshow(share, origin="lower", cmap="viridis", vmin=0, vmax=100)
+    right.set(xticks=[], yticks=[], xlabel="x", ylabel="y", title="reachable space from above")
+    figure.colorbar(image, ax=right, label="visited [%]", shrink=0.8)
     save_figure(figure, path)
 
 

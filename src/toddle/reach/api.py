@@ -89,8 +89,7 @@ def skill_of(session: Session, cycle: Cycle, source: Choice, *, pace: Pace) -> S
         pace: how quickly, for the figures.
     """
     progress, setting = cycle.progress, session.setting
-    physical, drawn = _seen(setting.box, progress, len(session.targets))
-    (postures, seen), seen_targets = (values.astype(float) for values in kept(physical)), np.asarray(drawn, float)
+    postures, seen = (values.astype(float) for values in kept(_seen(setting.box, progress, len(session.targets))[0]))
     errors = errors_of(lambda x: session.predict(progress, x), session.observe, session.targets)
     hidden = getattr(setting.learner, "hidden", ())
     skill = Skill(
@@ -104,7 +103,7 @@ def skill_of(session: Session, cycle: Cycle, source: Choice, *, pace: Pace) -> S
         "samples": cycle.samples,
         "seed": session.config.seed,
         **error_figures("fixed_error", errors),
-        **error_figures("seen_error", errors_of(skill.predict, session.observe, seen_targets)),
+        **error_figures("seen_error", seen_test(session, cycle)[1]),
         **error_figures("closed_loop_error", skill.reach_for(session.observe, session.targets, LOOKS)[1][-1]),
         "coverage_percent": 100 * float(cycle.history[-1].coverage) if cycle.history else 0.0,
         "test_points": len(session.targets),
@@ -121,6 +120,13 @@ def _seen(box: UnitBox, progress: Progress, count: int) -> tuple[Seen, Float[Arr
     q, x = box.q_from_unit(progress.seen.postures), box.x_from_unit(progress.seen.positions)
     physical = progress.seen._replace(postures=q, positions=x)
     return physical, draw_seen(physical, jax.random.fold_in(progress.key, 1), count)
+
+
+def seen_test(session: Session, cycle: Cycle) -> tuple[Float[np.ndarray, "points space"], Float[np.ndarray, " points"]]:
+    """The seen test set of a run's last cycle [m], and the open-loop error on each of its points [m]."""
+    _, drawn = _seen(session.setting.box, cycle.progress, len(session.targets))
+    targets = np.asarray(drawn, float)
+    return targets, errors_of(lambda x: session.predict(cycle.progress, x), session.observe, targets)
 
 
 def evaluate(
