@@ -101,7 +101,7 @@ def main() -> None:
     out = parser.parse_args().out
     use_compile_cache()
     body = toddle.load("nicu")
-    config = ReachConfig(hidden=(HIDDEN,), learning_rate=RATE, perturbation=PERTURBATION)
+    config = ReachConfig(hidden=(HIDDEN,), learning_rate=RATE, perturbation=PERTURBATION, network="plain")
     session = open_session(body, config)
 
     @eqx.filter_jit
