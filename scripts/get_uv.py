@@ -68,9 +68,7 @@ def by_download(scratch):
 
 def fits(filename):
     """Whether a wheel runs on this machine; one wheel may carry several platform tags."""
-    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(
-        platform.machine().lower(), platform.machine().lower()
-    )
+    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
     if sys.platform == "darwin":
         system, machine = "macosx_", "arm64" if machine == "aarch64" else machine
     else:
