@@ -62,7 +62,8 @@ def _continuous_motor(config: ReachConfig, box: UnitBox) -> Explorer:
 def _goal(config: ReachConfig, box: UnitBox) -> Explorer:
     # Rolf's step, 2 cm, is a hundredth of his workspace of 2 m: arms of all sizes take theirs
     span = float(box.space_span.max())
-    return direction_sampling(box, step=0.01 * span, sigma=_or(config.perturbation, 0.05))
+    # and going home more often and faster than he does kept more of our arms to one way of bending
+    return direction_sampling(box, step=0.01 * span, sigma=_or(config.perturbation, 0.05), p_home=0.8, home_step=0.2)
 
 
 def _random_goal(config: ReachConfig, box: UnitBox) -> Explorer:
