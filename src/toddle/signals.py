@@ -35,6 +35,83 @@ class Verdict(StrEnum):
     NOT_CONVERGED = "not converged"
 
 
+class Velocity(NamedTuple):
+    """A walking command, in the robot's own frame: forward, to the left [m/s], turning left [rad/s]."""
+
+    vx: float
+    vy: float
+    omega: float
+
+
+class Circle(NamedTuple):
+    """An obstacle on the floor, a tall cylinder: its centre and radius in the world [m]."""
+
+    x: float
+    y: float
+    radius: float
+
+
+class Footstep(NamedTuple):
+    """Where a sole stands: 0 the left, 1 the right; its frame's origin [m] and yaw [rad] on the floor."""
+
+    side: int
+    x: float
+    y: float
+    yaw: float
+
+
+class Reference(NamedTuple):
+    """What the walking pattern asks of the body at one instant, in the plan's frame (z = 0: the floor).
+
+    Rows of ``feet`` and its derivatives are the left and the right sole, columns x, y, z [m] and yaw [rad].
+
+    Attributes:
+        t: time [s].
+        com: centre of mass: position [m], velocity [m/s] and acceleration [m/s^2], one row each.
+        zmp: zero moment point [m].
+        yaw: of waist and chest: angle [rad], rate and acceleration.
+        feet: the soles' poses.
+        feet_velocity: their first derivative, per second.
+        feet_acceleration: their second derivative, per second squared.
+        load: share of the weight that each foot is to carry; they add up to 1.
+    """
+
+    t: float
+    com: Float[np.ndarray, "3 3"]
+    zmp: Float[np.ndarray, "2"]
+    yaw: Float[np.ndarray, "3"]
+    feet: Float[np.ndarray, "2 4"]
+    feet_velocity: Float[np.ndarray, "2 4"]
+    feet_acceleration: Float[np.ndarray, "2 4"]
+    load: Float[np.ndarray, "2"]
+
+
+class Senses(NamedTuple):
+    """What a humanoid's own sensors tell at one instant; nothing here is the simulator's truth but ``place``.
+
+    Attributes:
+        t: time [s].
+        joints: encoders, in the humanoid's order [rad].
+        rates: joint speeds [rad/s].
+        wrenches: left and right foot: the force [N] and torque [N m] that the floor applies to the sole, in the
+            sole's frame, about its origin. Standing, the third force is positive.
+        orientation: of the IMU in the world, unit quaternion (w, x, y, z).
+        gyro: angular velocity in the IMU's frame [rad/s].
+        acceleration: specific force in the IMU's frame [m/s^2]; at rest it points up and measures gravity.
+        place: x, y [m] and yaw [rad] of the waist in the world from whatever localises the robot; NaN without.
+            Only obstacles are placed by it.
+    """
+
+    t: float
+    joints: Float[np.ndarray, " joints"]
+    rates: Float[np.ndarray, " joints"]
+    wrenches: Float[np.ndarray, "2 6"]
+    orientation: Float[np.ndarray, "4"]
+    gyro: Float[np.ndarray, "3"]
+    acceleration: Float[np.ndarray, "3"]
+    place: Float[np.ndarray, "3"]
+
+
 @dataclass(frozen=True)
 class Solution:
     """An answer to "which joint angles bring the tip there?".

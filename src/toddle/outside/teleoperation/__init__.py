@@ -1,0 +1,1 @@
+"""A person, or a file of theirs, commands the robot."""

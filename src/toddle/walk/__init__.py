@@ -1,0 +1,1 @@
+"""Velocity commands become postures: pattern, posture, balance, and the loop that closes them."""
