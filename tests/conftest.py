@@ -11,6 +11,11 @@ import pytest
 from hypothesis import settings
 from jaxtyping import install_import_hook
 
+from toddle.outside.compile_cache import kernel_files, kernels_hash
+
+SOURCE = Path(__file__).parents[1] / "src" / "toddle"
+KERNELS = kernel_files(SOURCE)
+
 # All of this stands before anything imports jax, matplotlib or toddle.
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(Path(__file__).parents[1] / ".cache" / "jax"))
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
@@ -18,10 +23,19 @@ os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
 os.environ.setdefault("JAX_NUMPY_DTYPE_PROMOTION", "strict")
 os.environ.setdefault("JAX_NUMPY_RANK_PROMOTION", "raise")
 os.environ["JAX_PLATFORMS"] = "cpu"
+os.environ.setdefault("NUMBA_CACHE_DIR", str(Path(__file__).parents[1] / ".cache" / "numba" / kernels_hash(KERNELS)))
 os.environ["MPLBACKEND"] = "agg"
 
+
+def checked() -> list[str]:
+    """Every module of toddle but those with compiled kernels: Numba can't compile a function that is wrapped."""
+    paths = [path for path in sorted(SOURCE.rglob("*.py")) if path not in KERNELS]
+    modules = [path.relative_to(SOURCE.parent).with_suffix("").parts for path in paths]
+    return [".".join(parts) for parts in modules if parts[-1] != "__init__"]
+
+
 # From here on a wrong shape in toddle raises where it happens.
-install_import_hook("toddle", "beartype.beartype")
+install_import_hook(checked(), "beartype.beartype")
 
 settings.register_profile("toddle", derandomize=True, deadline=None, max_examples=25, print_blob=True)
 settings.load_profile("toddle")

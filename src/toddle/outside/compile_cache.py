@@ -5,20 +5,21 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
-from collections.abc import MutableMapping
+from collections.abc import MutableMapping, Sequence
 from pathlib import Path
 
 
 def use_compile_cache(environment: MutableMapping[str, str] | None = None) -> Path | None:
-    """Tell JAX, before it is imported, where to keep what it compiles; what the user has set stays.
+    """Tell JAX and Numba, before they are imported, where to keep what they compile; what the user has set stays.
 
     Args:
-        environment: where JAX looks for its settings; the process's own by default.
+        environment: where they look for their settings; the process's own by default.
 
     Returns:
-        The folder, or None where none can be written: then every start compiles again.
+        JAX's folder, or None where none can be written: then every start compiles again.
     """
     settings = os.environ if environment is None else environment
+    _keep_kernels(settings)
     settings.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")
     if "JAX_COMPILATION_CACHE_DIR" in settings:
         return Path(settings["JAX_COMPILATION_CACHE_DIR"])
@@ -33,6 +34,28 @@ def use_compile_cache(environment: MutableMapping[str, str] | None = None) -> Pa
     settings.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
     settings.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
     return folder
+
+
+def kernel_files(source: Path) -> list[Path]:
+    """The files with kernels that Numba compiles."""
+    return [path for path in sorted(source.rglob("*.py")) if "from numba import" in path.read_text()]
+
+
+def kernels_hash(files: Sequence[Path]) -> str:
+    """Names a state of the kernels: Numba by itself doesn't notice that one which another file calls has changed."""
+    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:12]
+
+
+def _keep_kernels(settings: MutableMapping[str, str]) -> None:
+    if "NUMBA_CACHE_DIR" in settings:
+        return
+    state = kernels_hash(kernel_files(Path(__file__).parents[1] / "walk"))
+    folder = cache_home(settings) / "numba" / f"{_processor()}-{state}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return
+    settings["NUMBA_CACHE_DIR"] = str(folder)
 
 
 def cache_home(environment: MutableMapping[str, str]) -> Path:

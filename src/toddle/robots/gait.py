@@ -15,6 +15,8 @@ from toddle.signals import Velocity
 GRAVITY = 9.81
 """Acceleration of the walking pattern [m/s^2]."""
 
+_FASTEST = Velocity(0.3, 0.1, 0.3)
+
 
 @dataclass(frozen=True)
 class Gait:
@@ -58,7 +60,7 @@ class Gait:
     hull: tuple[tuple[float, float], ...] = ()
     longest_turn: float = 0.4
     fastest_turn: float = 0.8
-    fastest: Velocity = Velocity(0.3, 0.1, 0.3)
+    fastest: Velocity = _FASTEST
     command_period: float = 0.01
     still: int = 0
     start: tuple[float, float] | None = None
@@ -74,7 +76,15 @@ class Gait:
             flat = [value] if isinstance(value, int | float) else _numbers(value)
             if not all(math.isfinite(number) for number in flat):
                 raise _bad(field.name, value, "give finite numbers")
-        for name in ("com_height", "foot_distance", "foot_length", "foot_width", "step_time", "sample", "command_period"):
+        for name in (
+            "com_height",
+            "foot_distance",
+            "foot_length",
+            "foot_width",
+            "step_time",
+            "sample",
+            "command_period",
+        ):
             if getattr(self, name) <= 0:
                 raise _bad(name, getattr(self, name), "give a number above 0")
         if not 0 <= self.double_support < self.step_time:
