@@ -1,0 +1,91 @@
+"""The walks that have a name: a velocity over time, how long, and what stands in the way; frozen records.
+
+After the tasks of Huber 2019, sections 4.1.1 and 4.1.2: straight, curved, turned, around an obstacle.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from toddle.failures import unknown_name
+from toddle.signals import Circle, Velocity
+from toddle.walk.gate import STILL
+
+
+class Leg(NamedTuple):
+    """From time ``t`` [s] on, this velocity, until the next leg."""
+
+    t: float
+    velocity: Velocity
+
+
+def velocity_at(legs: tuple[Leg, ...], t: float) -> Velocity:
+    """The velocity that legs in the order of time ask for at one time [s]; before the first one, to stand."""
+    index = bisect_right(legs, t + _EARLY, key=lambda leg: leg.t)
+    return legs[index - 1].velocity if index else STILL
+
+
+_EARLY = 1e-9  # [s]; ticks that were added up meet the time that they mean
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A walk that has a name.
+
+    Attributes:
+        name: how it is called on the command line.
+        about: one line for the listing.
+        legs: velocities over time.
+        seconds: how long it is commanded [s].
+        circles: obstacles on the floor, in the frame in which the robot starts, facing x.
+    """
+
+    name: str
+    about: str
+    legs: tuple[Leg, ...]
+    seconds: float = 20.0
+    circles: tuple[Circle, ...] = ()
+
+
+def _steady(vx: float, vy: float, omega: float) -> tuple[Leg, ...]:
+    return (Leg(0.0, Velocity(vx, vy, omega)),)
+
+
+def _stop_and_go(velocity: Velocity, period: float, times: int) -> tuple[Leg, ...]:
+    """Walk for half a period and stand for the other, so many times."""
+    return tuple(
+        Leg(period * (time + half), (velocity, STILL)[half > 0]) for time in range(times) for half in (0.0, 0.5)
+    )
+
+
+SCENARIOS = {
+    scenario.name: scenario
+    for scenario in (
+        Scenario("straight", "straight ahead", _steady(0.1, 0.0, 0.0)),
+        Scenario("sideways", "to the left, facing ahead", _steady(0.0, 0.1, 0.0)),
+        Scenario("curve", "ahead and turning left", _steady(0.1, 0.0, 0.1)),
+        Scenario("turn", "turning left in place", _steady(0.0, 0.0, 0.2)),
+        Scenario("diagonal", "ahead and to the left", _steady(0.1, 0.05, 0.0)),
+        Scenario(
+            "obstacle",
+            "straight on past a cylinder beside the line",
+            _steady(0.15, 0.0, 0.0),
+            circles=(Circle(1.2, 0.3, 0.1),),
+        ),
+        Scenario("stop-and-go", "five seconds of walking, five of standing", _stop_and_go(Velocity(0.15, 0, 0), 10, 2)),
+    )
+}
+"""Every scenario by its name."""
+
+
+def scenario_named(name: str) -> Scenario:
+    """The scenario of that name.
+
+    Raises:
+        BadInput: there is none.
+    """
+    if name not in SCENARIOS:
+        raise unknown_name("scenario", name, SCENARIOS, where="--scenario")
+    return SCENARIOS[name]
