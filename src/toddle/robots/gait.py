@@ -43,6 +43,8 @@ class Gait:
         command_period: of the trajectory [s].
         still: periods of standing before the first step, each of ``sample`` (n_still).
         start: x, y of the centre of mass at the start [m]; None: between the feet.
+        first: x, y of the left sole at the start [m]; None: 0 and half of ``foot_distance``.
+        objective: alpha, beta, gamma of Huber 2019, equations 2.43 to 2.46; the document's, for this gait.
     """
 
     com_height: float
@@ -64,6 +66,8 @@ class Gait:
     command_period: float = 0.01
     still: int = 0
     start: tuple[float, float] | None = None
+    first: tuple[float, float] | None = None
+    objective: tuple[float, float, float] = (1.0, 1e2, 1e-2)
 
     def __post_init__(self) -> None:
         """Refuses what nothing can walk by.
