@@ -11,7 +11,7 @@ import difflib
 import re
 from collections.abc import Sequence
 from dataclasses import MISSING
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from toddle.cli.options import Option, options_of, shown
 from toddle.cli.usage import usage
@@ -49,11 +49,11 @@ def parse(config: type[Config], argv: Sequence[str], *, prog: str) -> Config:
         raise BadInput(str(fault), where=prog) from fault
 
 
-def _read(options: tuple[Option, ...], words: list[str], prog: str) -> dict[str, object]:
+def _read(options: tuple[Option, ...], words: list[str], prog: str) -> dict[str, Any]:
     """The values given, by field name."""
     flags = {flag: (option, value) for option in options for flag, value in option.flags.items()}
     waiting = [option for option in options if option.positional]
-    given: dict[str, object] = {}
+    given: dict[str, Any] = {}
     while words:
         word = words.pop(0)
         name, equals, attached = word.partition("=")
@@ -71,6 +71,8 @@ def _read(options: tuple[Option, ...], words: list[str], prog: str) -> dict[str,
                 raise BadInput(f"takes no value, got {shown(attached)}", where=name, remedy=f"write {name} alone")
             attachments = [attached] if equals else None
             value = fixed if fixed is not None else option.convert(attachments or _values(option, words))
+        if option.repeated:
+            value = (*given.pop(option.name, ()), value)
         if option.name in given:
             raise BadInput("given twice", where=option.flag, remedy="give it once")
         given[option.name] = value

@@ -27,7 +27,9 @@ class Option:
     """A field of a configuration, as it is given on the command line.
 
     The field's type is one of str, int, float, bool, Path, a Literal or an Enum; a tuple of these, of fixed
-    or any length (``tuple[float, ...]``); or one of all that, or None.
+    or any length (``tuple[float, ...]``); any number of such tuples of fixed length, one each time that the option
+    is given (``tuple[tuple[float, float], ...]``); or one of all that, or None. A field that would be a word of
+    Python's ends with an underscore (``for_`` is ``--for``).
 
     Attributes:
         name: the field's name.
@@ -40,6 +42,7 @@ class Option:
         positional: whether it is given by its place.
         about: what it is for, from the docstring.
         choices: the words it takes, where only some are.
+        repeated: whether it may be given again, each time adding a value.
     """
 
     name: str
@@ -52,11 +55,12 @@ class Option:
     positional: bool
     about: str
     choices: tuple[str, ...] = ()
+    repeated: bool = False
 
     @property
     def flag(self) -> str:
         """How a message calls it."""
-        return self.name.upper() if self.positional else "--" + self.name.replace("_", "-")
+        return self.name.upper() if self.positional else "--" + self.name.rstrip("_").replace("_", "-")
 
     @property
     def flags(self) -> dict[str, bool | None]:
@@ -114,6 +118,10 @@ def _option(name: str, hint: Any, default: object, about: str) -> Option:
         marks = tuple(rest)
     if get_origin(hint) in (Union, UnionType):
         (hint,) = [kind for kind in get_args(hint) if kind is not NoneType]
+    parts = get_args(hint)
+    repeated = get_origin(hint) is tuple and parts[-1] is ... and get_origin(parts[0]) is tuple
+    if repeated:
+        hint = parts[0]
     inner, fewest, most = hint, 1, 1
     if get_origin(hint) in (tuple, list):
         inner = get_args(hint)[0]
@@ -124,7 +132,7 @@ def _option(name: str, hint: Any, default: object, about: str) -> Option:
     choices = _choices(inner)
     read, kind = (_choice(choices), "NAME") if choices else _reader(inner, finite=NOT_FINITE not in marks)
     place = POSITIONAL in marks
-    return Option(name, read, kind, fewest, most, hint is inner, default, place, about, tuple(choices))
+    return Option(name, read, kind, fewest, most, hint is inner, default, place, about, tuple(choices), repeated)
 
 
 def _reader(kind: Any, *, finite: bool) -> tuple[Callable[[str], object], str]:
