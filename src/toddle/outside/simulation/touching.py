@@ -1,0 +1,107 @@
+"""Who touches whom: the floor's forces on the soles, and how near feet, legs and body come to the obstacles."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from toddle.outside.simulation.world import OBSTACLE, SOLES
+from toddle.robots.humanoid import Humanoid
+
+FEET, LEGS, BODY = 0, 1, 2
+_NONE = -1
+_FAR = 1.0  # no clearance is told beyond it [m]
+
+
+class Shapes(NamedTuple):
+    """What each of MuJoCo's geoms is.
+
+    Attributes:
+        part: of each geom: 0 a foot, 1 a leg, 2 the body, -1 none of the robot.
+        obstacle: whether each geom is one.
+        sole: whether each geom is one.
+        robot: geoms of the robot.
+        obstacles: geoms of the obstacles.
+    """
+
+    part: Int[np.ndarray, " geoms"]
+    obstacle: Bool[np.ndarray, " geoms"]
+    sole: Bool[np.ndarray, " geoms"]
+    robot: tuple[int, ...]
+    obstacles: tuple[int, ...]
+
+
+def shapes(humanoid: Humanoid, model: mujoco.MjModel, obstacles: int) -> Shapes:
+    """Sorts a model's geoms: a foot is all that moves with a sole, a leg what is between it and the waist's body."""
+    feet = {int(model.site_bodyid[model.site(name).id]) for name in SOLES}
+    trunk = set(_upwards(model, int(model.site_bodyid[model.site("waist").id])))
+    legs = {body for foot in feet for body in _upwards(model, foot)} - feet - trunk
+    part = np.full(model.ngeom, _NONE)
+    for geom, body in enumerate(model.geom_bodyid.tolist()):
+        if model.body_weldid[body] != 0:
+            part[geom] = FEET if body in feet else LEGS if body in legs else BODY
+    obstacle, sole = np.zeros(model.ngeom, bool), np.zeros(model.ngeom, bool)
+    obstacle[[model.geom(OBSTACLE.format(number)).id for number in range(obstacles)]] = True
+    sole[[model.geom(name).id for name in SOLES]] = True
+    robot = tuple(np.flatnonzero(part != _NONE).tolist())
+    return Shapes(part, obstacle, sole, robot, tuple(np.flatnonzero(obstacle).tolist()))
+
+
+def floor_wrench(shapes: Shapes, model: mujoco.MjModel, data: mujoco.MjData) -> Float[np.ndarray, "6"]:
+    """Force [N] and torque about the world's origin [N m] that floor and bumps apply to the soles."""
+    wrench = np.zeros(6)
+    if data.ncon == 0:
+        return wrench
+    contacts = data.contact
+    sole = shapes.sole[contacts.geom]
+    counted = np.flatnonzero((sole[:, 0] != sole[:, 1]) & ~shapes.obstacle[contacts.geom].any(axis=1))
+    local = np.zeros(6)
+    forces = np.zeros((len(counted), 3))
+    for row, number in enumerate(counted.tolist()):
+        mujoco.mj_contactForce(model, data, number, local)
+        forces[row] = local[:3]
+    # the frame's first axis points from the first geom to the second; the force acts on the second
+    forces = np.einsum("ci,cij->cj", forces, contacts.frame[counted].reshape(-1, 3, 3))
+    forces *= np.where(sole[counted, 1], 1.0, -1.0)[:, None]
+    x, y, z = contacts.pos[counted].T
+    fx, fy, fz = forces.T
+    wrench[:3] = forces.sum(axis=0)
+    wrench[3:] = (y * fz - z * fy).sum(), (z * fx - x * fz).sum(), (x * fy - y * fx).sum()
+    return wrench
+
+
+def touching(shapes: Shapes, data: mujoco.MjData) -> Bool[np.ndarray, "3"]:
+    """Whether feet, legs and body touch an obstacle."""
+    parts = np.zeros(3, bool)
+    if data.ncon:
+        first, second = data.contact.geom.T
+        for one, other in ((first, second), (second, first)):
+            parts[shapes.part[one[shapes.obstacle[other] & (shapes.part[one] != _NONE)]]] = True
+    return parts
+
+
+def clearances(shapes: Shapes, model: mujoco.MjModel, data: mujoco.MjData) -> Float[np.ndarray, "3"]:
+    """Distance of feet, legs and body to the nearest obstacle [m], at most 1; under 0 they overlap."""
+    nearest = np.full(3, _FAR)
+    for obstacle in shapes.obstacles:
+        radius = model.geom_size[obstacle, 0]
+        away = np.linalg.norm(data.geom_xpos[:, :2] - data.geom_xpos[obstacle, :2], axis=1)
+        bound = away - radius - model.geom_rbound
+        for geom in shapes.robot:
+            part = shapes.part[geom]
+            if bound[geom] < nearest[part]:
+                distance = mujoco.mj_geomDistance(model, data, geom, obstacle, nearest[part], None)
+                nearest[part] = min(nearest[part], distance)
+    return nearest
+
+
+def _upwards(model: mujoco.MjModel, body: int) -> list[int]:
+    """A body and all that it hangs on, but the world."""
+    chain: list[int] = []
+    while body:
+        chain.append(body)
+        body = int(model.body_parentid[body])
+    return chain
