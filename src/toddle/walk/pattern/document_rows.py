@@ -1,4 +1,4 @@
-"""The constraints of the document's walking pattern, each with its derivative by the soles' yaws (Huber 2019, 2.61-2.82).
+"""Constraints of the document's walking pattern, each with its derivative by the yaws (Huber 2019, 2.61 to 2.82).
 
 Unknowns, in the order of 2.53: N jerks and N_f footsteps along x, then the same along y. A constraint reads
 ``lower <= matrix @ unknowns <= upper``. The matrices depend on yaws: entry 0 belongs to the sole that stands,
