@@ -43,7 +43,11 @@ _CHANGES = {
     "left": Velocity(0.0, 0.0, 1.0), "right": Velocity(0.0, 0.0, -1.0),
     "aside left": Velocity(0.0, 1.0, 0.0), "aside right": Velocity(0.0, -1.0, 0.0),
 }  # fmt: skip
-_SEQUENCE = re.compile(rb"\x1b(?:\[[0-9;]*[@-~]|O[@-~])|[^\x1b]|\x1b(?=\x1b)|\x1b(?=[^\[O])", re.DOTALL)
+_SEQUENCE = re.compile(
+    rb"\x1b\[[0-9;]*[@-~] | \x1bO[@-~] | [^\x1b]"
+    rb"| \x1b(?= [^\[O] | \[[0-9;]*[^0-9;@-~] | O[^@-~])",  # an escape that begins nothing: what follows counts
+    re.DOTALL | re.VERBOSE,
+)
 
 
 def keys_in(heard: bytes) -> tuple[tuple[str, ...], bytes]:
