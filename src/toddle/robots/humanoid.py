@@ -78,6 +78,9 @@ class Humanoid:
             position servo named for each joint, in order; sites left_sole, right_sole, waist, chest, imu; sensors
             left_force, left_torque, right_force, right_torque (at the soles' frames), gyro, accelerometer and
             orientation (at the imu); box geoms left_sole and right_sole; cameras left_eye and right_eye.
+            MuJoCo's force and torque sensors tell what the leg does to the sole: `Senses.wrenches` is their negative.
+            Contacts: soles have bit 1; shells around the links have conaffinity 2 alone, so that a floor of contype 1
+            never touches them and an obstacle of contype 3 does.
         notes: what the description did not say and was inferred, one line each.
     """
 
