@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from toddle.failures import BadInput
 from toddle.outside.simulation.disturbances import TICK, TIMESTEP, WorldOptions
 from toddle.outside.simulation.senses import organs, sense, site
-from toddle.outside.simulation.touching import clearances, floor_wrench, shapes, touching
+from toddle.outside.simulation.touching import clearances, shapes, touching
 from toddle.outside.simulation.world import build
 from toddle.robots.humanoid import Humanoid
 from toddle.signals import Senses
@@ -37,7 +37,8 @@ class Truth(NamedTuple):
         v: velocity, likewise.
         com: centre of mass [m].
         com_velocity: its velocity [m/s].
-        zmp: zero moment point on the floor, from the contact forces [m]; NaN in the air.
+        zmp: zero moment point on the floor, from all contact forces on the feet [m]; NaN in the air.
+        load: upward force on each foot [N]; both are means over the last tick.
         soles: left and right: x, y, z [m] and yaw [rad].
         tilt: angle of each sole to the floor [rad].
         waist: x, y [m] and yaw [rad].
@@ -53,6 +54,7 @@ class Truth(NamedTuple):
     com: Float[np.ndarray, "3"]
     com_velocity: Float[np.ndarray, "3"]
     zmp: Float[np.ndarray, "2"]
+    load: Float[np.ndarray, "2"]
     soles: Float[np.ndarray, "2 4"]
     tilt: Float[np.ndarray, "2"]
     waist: Float[np.ndarray, "3"]
@@ -102,6 +104,9 @@ class HumanoidSimulation:
         self._shapes = shapes(humanoid, self.model, len(self.options.circles))
         self._chest = int(self.model.site_bodyid[site(humanoid, self.model, "chest")])
         self._soles = [site(humanoid, self.model, name) for name in ("left_sole", "right_sole")]
+        self._root = int(self.model.body_rootid[self._chest])
+        self._feet = [int(self.model.site_bodyid[number]) for number in self._soles]
+        self._vectors, self._contact, self._about = np.zeros(self.model.nsensordata), np.zeros((2, 6)), np.zeros(3)
         self._late = round(self.options.delay_s / TICK)
         self.reset()
 
@@ -123,8 +128,11 @@ class HumanoidSimulation:
         if self.model.na:
             self.data.act[:] = start[7:]
         mujoco.mj_forward(self.model, self.data)
+        self._contact[:], self._about[:] = self.data.cfrc_ext[self._feet], self.data.subtree_com[self._root]
         self._height = float(self.data.site_xpos[self._organs.waist, 2])
-        felt = sense(self._organs, self.data, 0.0, self.data.qpos, self.data.qvel, self.options, self._draw)
+        felt = sense(
+            self._organs, self.data.sensordata, self.data, 0.0, self.data.qpos, self.data.qvel, self.options, self._draw
+        )
         self._felt = deque([felt] * (self._late + 1), maxlen=self._late + 1)
         return felt
 
@@ -143,11 +151,8 @@ class HumanoidSimulation:
         self.data.ctrl[:] = self._numbers(servo, self.model.nu, "servo targets")
         if self._pushes:
             self._press()
-        mujoco.mj_step(self.model, self.data, nstep=_STEPS - 1)
-        # MuJoCo's sensors belong to the state before a step: so do these encoders
-        t, q, v = float(self.data.time), self.data.qpos.copy(), self.data.qvel.copy()
-        mujoco.mj_step(self.model, self.data)
-        self._felt.append(sense(self._organs, self.data, t, q, v, self.options, self._draw))
+        t, q, v = self._steps()
+        self._felt.append(sense(self._organs, self._vectors, self.data, t, q, v, self.options, self._draw))
         if self.options.circles:
             self.touched |= touching(self._shapes, self.data)
         return self._felt[0]
@@ -186,9 +191,10 @@ class HumanoidSimulation:
             float(data.time),
             data.qpos.copy(),
             data.qvel.copy(),
-            data.subtree_com[0].copy(),
-            data.subtree_linvel[0].copy(),
-            _zmp(floor_wrench(self._shapes, model, data)),
+            data.subtree_com[self._root].copy(),
+            data.subtree_linvel[self._root].copy(),
+            _zmp(self._contact.sum(axis=0), self._about),
+            self._contact[:, 5].copy(),
             np.column_stack([data.site_xpos[self._soles], yaws]),
             np.arccos(np.clip(turned[:, 8], -1.0, 1.0)),
             np.array([*data.site_xpos[self._organs.waist, :2], math.atan2(waist[3], waist[0])]),
@@ -197,6 +203,24 @@ class HumanoidSimulation:
             clearances(self._shapes, model, data) if near else np.ones(3),
             float(np.mean(force >= _AT_LIMIT * self.humanoid.effort)),
         )
+
+    def _steps(self) -> tuple[float, Float[np.ndarray, " positions"], Float[np.ndarray, " speeds"]]:
+        """One tick of physics; the start of its last step, to which MuJoCo's sensors then belong."""
+        self._vectors[:] = 0.0
+        self._contact[:] = 0.0
+        for _ in range(_STEPS - 1):
+            self._step()
+        t, q, v = float(self.data.time), self.data.qpos.copy(), self.data.qvel.copy()
+        self._about[:] = self.data.subtree_com[self._root]
+        self._step()
+        self._vectors /= _STEPS
+        self._contact /= _STEPS
+        return t, q, v
+
+    def _step(self) -> None:
+        mujoco.mj_step(self.model, self.data)
+        self._vectors += self.data.sensordata
+        self._contact += self.data.cfrc_ext[self._feet]
 
     def _press(self) -> None:
         """The mean force of all pushes over this tick, so that each one's impulse is exact."""
@@ -228,7 +252,8 @@ class HumanoidSimulation:
         return array
 
 
-def _zmp(wrench: Float[np.ndarray, "6"]) -> Float[np.ndarray, "2"]:
-    """Where the floor's wrench about the world's origin has no level torque."""
-    lift = wrench[2]
-    return np.array([-wrench[4], wrench[3]]) / lift if lift > 1.0 else np.full(2, math.nan)
+def _zmp(wrench: Float[np.ndarray, "6"], about: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2"]:
+    """Where on the floor a wrench (torque about a point, force) has no level torque."""
+    tx, ty, _, fx, fy, fz = wrench.tolist()
+    x, y, z = about.tolist()
+    return np.array([x - (ty + z * fx) / fz, y + (tx - z * fy) / fz]) if fz > 1.0 else np.full(2, math.nan)

@@ -1,7 +1,9 @@
 """The senses of a simulated humanoid: which numbers of MuJoCo they are, and what they have of noise, bias and age.
 
 A force-torque sensor sits above the sole and feels the foot's own weight too. As on the real robot that weight is
-known and taken off, for a foot that is level; what a foot's acceleration adds stays.
+known and taken off, for a foot that is level; what a foot's acceleration adds stays. Forces and the inertial unit's
+rates are means over a tick, as a sensor that measures faster than it reports gives them: the servos' targets change
+once a tick, and a force that is looked at always at the same moment after it shows only that moment.
 """
 
 from __future__ import annotations
@@ -76,6 +78,7 @@ def organs(humanoid: Humanoid, model: mujoco.MjModel, options: WorldOptions) -> 
 
 def sense(
     organs: Organs,
+    mean: Float[np.ndarray, " sensors"],
     data: mujoco.MjData,
     t: float,
     q: Float[np.ndarray, " positions"],
@@ -87,6 +90,7 @@ def sense(
 
     Args:
         organs: see `Organs`.
+        mean: of ``sensordata`` over the tick: what forces, gyro and accelerometer tell.
         data: whose ``sensordata`` and sites belong to q and v.
         t: time of the measurement [s].
         q: configuration.
@@ -96,7 +100,7 @@ def sense(
     """
     n = organs.joints
     error = organs.bias + organs.sigma * draw.standard_normal(len(organs.sigma))
-    vectors = data.sensordata[organs.places]
+    vectors = mean[organs.places]
     vectors *= organs.sign
     vectors += organs.tare
     vectors += error[2 * n : 2 * n + 18]

@@ -1,4 +1,4 @@
-"""Who touches whom: the floor's forces on the soles, and how near feet, legs and body come to the obstacles."""
+"""How near feet, legs and body come to the obstacles, and which of them touches one."""
 
 from __future__ import annotations
 
@@ -22,14 +22,12 @@ class Shapes(NamedTuple):
     Attributes:
         part: of each geom: 0 a foot, 1 a leg, 2 the body, -1 none of the robot.
         obstacle: whether each geom is one.
-        sole: whether each geom is one.
         robot: geoms of the robot.
         obstacles: geoms of the obstacles.
     """
 
     part: Int[np.ndarray, " geoms"]
     obstacle: Bool[np.ndarray, " geoms"]
-    sole: Bool[np.ndarray, " geoms"]
     robot: tuple[int, ...]
     obstacles: tuple[int, ...]
 
@@ -43,34 +41,10 @@ def shapes(humanoid: Humanoid, model: mujoco.MjModel, obstacles: int) -> Shapes:
     for geom, body in enumerate(model.geom_bodyid.tolist()):
         if model.body_weldid[body] != 0:
             part[geom] = FEET if body in feet else LEGS if body in legs else BODY
-    obstacle, sole = np.zeros(model.ngeom, bool), np.zeros(model.ngeom, bool)
+    obstacle = np.zeros(model.ngeom, bool)
     obstacle[[model.geom(OBSTACLE.format(number)).id for number in range(obstacles)]] = True
-    sole[[model.geom(name).id for name in SOLES]] = True
     robot = tuple(np.flatnonzero(part != _NONE).tolist())
-    return Shapes(part, obstacle, sole, robot, tuple(np.flatnonzero(obstacle).tolist()))
-
-
-def floor_wrench(shapes: Shapes, model: mujoco.MjModel, data: mujoco.MjData) -> Float[np.ndarray, "6"]:
-    """Force [N] and torque about the world's origin [N m] that floor and bumps apply to the soles."""
-    wrench = np.zeros(6)
-    if data.ncon == 0:
-        return wrench
-    contacts = data.contact
-    sole = shapes.sole[contacts.geom]
-    counted = np.flatnonzero((sole[:, 0] != sole[:, 1]) & ~shapes.obstacle[contacts.geom].any(axis=1))
-    local = np.zeros(6)
-    forces = np.zeros((len(counted), 3))
-    for row, number in enumerate(counted.tolist()):
-        mujoco.mj_contactForce(model, data, number, local)
-        forces[row] = local[:3]
-    # the frame's first axis points from the first geom to the second; the force acts on the second
-    forces = np.einsum("ci,cij->cj", forces, contacts.frame[counted].reshape(-1, 3, 3))
-    forces *= np.where(sole[counted, 1], 1.0, -1.0)[:, None]
-    x, y, z = contacts.pos[counted].T
-    fx, fy, fz = forces.T
-    wrench[:3] = forces.sum(axis=0)
-    wrench[3:] = (y * fz - z * fy).sum(), (z * fx - x * fz).sum(), (x * fy - y * fx).sum()
-    return wrench
+    return Shapes(part, obstacle, robot, tuple(np.flatnonzero(obstacle).tolist()))
 
 
 def touching(shapes: Shapes, data: mujoco.MjData) -> Bool[np.ndarray, "3"]:
