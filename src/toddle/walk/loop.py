@@ -1,0 +1,157 @@
+"""The control loop, closed: command -> walker -> robot -> senses -> walker.
+
+The robot is a value that answers `Robot`: the simulation, or a real one behind a bridge. The command is any function of
+time. Nothing here knows who they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+import numpy as np
+from jaxtyping import Float
+
+from toddle.signals import Circle, Reference, Senses, Velocity
+from toddle.walk.balance import support
+from toddle.walk.config import TICK
+from toddle.walk.gate import STILL, gate
+from toddle.walk.state import Mode, WalkerState
+from toddle.walk.stepping import achieved
+from toddle.walk.walker import Walker
+
+if TYPE_CHECKING:
+    from toddle.walk.pattern.nmpc import Plan
+
+CommandSource = Callable[[float], Velocity | None]
+"""The velocity asked for at a time [s]; None: it has ended, and the robot is to stand."""
+
+_FALLEN = 0.8  # tilt of the waist from which nothing brings it back [rad]
+_STOPPING = 8.0  # the most that a stop may take [s]
+
+
+class Robot(Protocol):
+    """A humanoid that is driven by its servos."""
+
+    def reset(self) -> Senses:
+        """Stand at home."""
+        ...
+
+    def tick(self, servo: Float[np.ndarray, " joints"]) -> Senses:
+        """Command the servos and let 10 ms pass."""
+        ...
+
+
+class Measured(NamedTuple):
+    """What the senses tell of the walk, in the plan's frame.
+
+    Attributes:
+        com: centre of mass [m].
+        com_velocity: its velocity [m/s].
+        zmp: zero moment point from the ankles' sensors [m]; NaN without contact.
+        feet: soles, x, y, z [m], yaw [rad].
+        yaw: heading of the waist [rad].
+        velocity: achieved over the last two steps; NaN before.
+        force: upwards, on each foot [N].
+        margin: of the measured zero moment point to the edge of the soles that stand [m]; negative outside.
+    """
+
+    com: Float[np.ndarray, "3"]
+    com_velocity: Float[np.ndarray, "3"]
+    zmp: Float[np.ndarray, "2"]
+    feet: Float[np.ndarray, "2 4"]
+    yaw: float
+    velocity: Velocity
+    force: Float[np.ndarray, "2"]
+    margin: float
+
+
+class Moment(NamedTuple):
+    """One tick.
+
+    Attributes:
+        t: time [s].
+        asked: the command as it came.
+        allowed: what the safety gate let through.
+        reference: what the walking pattern asks for.
+        measured: what the senses tell.
+        plan: the predictive controller's plan, if one was made in this tick.
+        posture_ms: time of the inverse kinematics [ms].
+        support: 0 the left foot carries, 1 the right, -1 both.
+        fell: the robot lies over.
+    """
+
+    t: float
+    asked: Velocity
+    allowed: Velocity
+    reference: Reference
+    measured: Measured
+    plan: Plan | None
+    posture_ms: float
+    support: int
+    fell: bool
+
+
+def walk(
+    walker: Walker,
+    robot: Robot,
+    commands: CommandSource,
+    seconds: float | None = None,
+    circles: tuple[Circle, ...] = (),
+    *,
+    limited: bool = True,
+) -> Iterator[Moment]:
+    """Walk, one moment a tick, until the commands end, the time is over, or the robot has fallen.
+
+    When the commands end the robot comes to stand, feet side by side; ``seconds`` cuts at once.
+
+    Args:
+        walker: decides.
+        robot: moves and feels.
+        commands: asked at each tick.
+        seconds: the most to walk [s]; None: as long as commands come.
+        circles: obstacles, in the frame of ``Senses.place``.
+        limited: whether the gate limits how fast a command changes.
+    """
+    senses, state, allowed = robot.reset(), walker.start(), STILL
+    ended: float | None = None
+    while seconds is None or state.t < seconds - TICK / 2:
+        asked = None if ended is not None else commands(state.t)
+        if asked is None and ended is None:
+            ended = state.t
+        stands = state.mode == Mode.STAND and allowed == STILL
+        if ended is not None and (stands or state.t - ended > _STOPPING):
+            return
+        command = STILL if asked is None else asked
+        allowed = gate(allowed, command, walker.gait.fastest, TICK, limited=limited)
+        state, action = walker.step(state, allowed, senses, circles)
+        senses = robot.tick(action.servo)
+        fell = bool(np.abs(action.estimate.tilt).max() > _FALLEN)
+        measured = _measured(walker, state)
+        supported = state.step.stance if _single(state) else -1
+        yield Moment(
+            state.t, command, allowed, action.reference, measured, action.plan, action.posture_ms, supported, fell
+        )
+        if fell:
+            return
+
+
+def _single(state: WalkerState) -> bool:
+    return state.mode == Mode.STEP and state.step.phase >= state.step.double_support
+
+
+def _measured(walker: Walker, state: WalkerState) -> Measured:
+    sensed = state.estimate
+    assert sensed is not None
+    velocity = achieved(state.landings) if len(state.landings) > 2 else Velocity(np.nan, np.nan, np.nan)
+    margin = support.margin(walker.area(state), (float(sensed.zmp[0]), float(sensed.zmp[1])))
+    return Measured(
+        sensed.com,
+        sensed.com_velocity,
+        sensed.zmp,
+        sensed.soles,
+        sensed.yaw,
+        velocity,
+        sensed.force,
+        margin,
+    )

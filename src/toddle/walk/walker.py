@@ -1,0 +1,371 @@
+"""The walker: one tick from senses and a velocity command to servo targets; a pure state machine.
+
+    senses -> estimate -> where and when to land -> zero moment point -> centre of mass, soles -> posture -> servos
+
+The predictive controller (``pattern``) plans the footsteps every tenth of a second and at each touchdown; between its
+plans the step adjustment (``balance``) corrects place and time of the landing from the measured DCM.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from toddle.robots.gait import Gait
+from toddle.robots.humanoid import LEFT, RIGHT, Humanoid
+from toddle.signals import Circle, Reference, Senses, Velocity
+from toddle.walk.balance import pendulum, support
+from toddle.walk.balance.estimate import Estimate, Observer, estimate, observer
+from toddle.walk.balance.feet import Feet, rest, swing
+from toddle.walk.balance.pendulum import Pair
+from toddle.walk.balance.step_adjustment import adjust
+from toddle.walk.config import TICK, WalkConfig
+from toddle.walk.pattern.displacement import rotate
+from toddle.walk.posture.model import PostureModel, posture_model
+from toddle.walk.posture.solve import WEIGHTS, PostureTarget, solve_posture
+from toddle.walk.posture.survey import static_torques
+from toddle.walk.state import Action, Landing, Mode, Pose, Step, WalkerState
+from toddle.walk.stepping import (
+    STILL,
+    Chain,
+    aim,
+    begin,
+    bounds,
+    by_command,
+    catching,
+    chain,
+    corrected,
+    first_stance,
+    moving,
+    shift_zmp,
+    side_by_side,
+)
+
+_SHRUNK = 0.8  # of the soles: a DCM outside of this, while standing, calls for a step
+
+
+@dataclass(frozen=True)
+class Walker:
+    """A humanoid that walks.
+
+    Attributes:
+        humanoid: the robot.
+        config: gains and switches.
+        observer: what estimating and inverse kinematics need of it, prepared.
+    """
+
+    humanoid: Humanoid
+    config: WalkConfig
+    observer: Observer
+
+    @property
+    def gait(self) -> Gait:
+        """How it steps."""
+        return self.humanoid.gait
+
+    @property
+    def model(self) -> PostureModel:
+        """What its inverse kinematics needs, prepared."""
+        return self.observer.model
+
+    def start(self) -> WalkerState:
+        """Standing at home, the plan's origin between the soles."""
+        feet = np.zeros((2, 4))
+        feet[LEFT, 1], feet[RIGHT, 1] = self.gait.foot_distance / 2, -self.gait.foot_distance / 2
+        still = np.zeros((2, 4))
+        foot = _pose(feet, RIGHT)
+        ahead = chain(self.gait, by_command(self.gait, STILL, RIGHT, 0.0), final=True)
+        step = begin(self.gait, RIGHT, foot, (0.0, 0.0), ahead, 0.0, True)
+        return WalkerState(
+            0.0, Mode.STAND, step, 0.0, feet.copy(), feet, still, still, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0),
+            (0.5, 0.5), self.humanoid.home, STILL, (), None, None, math.inf, 0,
+        )  # fmt: skip
+
+    def step(
+        self, state: WalkerState, velocity: Velocity, senses: Senses, circles: tuple[Circle, ...] = ()
+    ) -> tuple[WalkerState, Action]:
+        """One tick of 10 ms.
+
+        Args:
+            state: as the last tick left it.
+            velocity: the command.
+            senses: what the robot's sensors tell.
+            circles: obstacles, in the world in which ``senses.place`` is told.
+
+        Returns:
+            The next state, and what to do.
+        """
+        sensed = estimate(self.observer, senses, state.anchors, np.array(state.load), state.estimate, TICK)
+        state = state._replace(t=state.t + TICK, estimate=sensed)
+        state = self._change_mode(state, sensed, velocity)
+        wanted = _sum(velocity, state.correction) if moving(velocity) else STILL
+        state, ahead = self._plan(state, wanted, circles)
+        state, reference_zmp, reference_dcm = self._adjusted(state, sensed, ahead)
+        zmp = self._feedback(state, sensed, reference_zmp, reference_dcm)
+        state = self._follow(state, sensed, zmp)
+        feet = self._feet(state)
+        state = state._replace(feet=feet.pose, feet_velocity=feet.velocity, feet_acceleration=feet.acceleration)
+        reference = self._reference(state)
+        return self._act(state, reference, sensed, wanted)
+
+    def _change_mode(self, state: WalkerState, sensed: Estimate, velocity: Velocity) -> WalkerState:
+        if state.mode == Mode.STAND:
+            return self._leave_standing(state, sensed, velocity)
+        if state.mode == Mode.SHIFT:
+            left = state.shift_left - TICK
+            if left > 0:
+                return state._replace(shift_left=left)
+            return self._first_step(state, velocity)
+        step = state.step._replace(phase=state.step.phase + TICK)
+        state = state._replace(step=step)
+        swinging = 1 - step.stance
+        late = step.phase >= step.end + self.config.late
+        share = (step.phase - step.double_support) / max(step.end - step.double_support, TICK)
+        if late or (share >= self.config.touchdown and bool(sensed.contact[swinging])):
+            return self._land(state, sensed, velocity)
+        return state
+
+    def _leave_standing(self, state: WalkerState, sensed: Estimate, velocity: Velocity) -> WalkerState:
+        xi = (float(sensed.dcm[0]), float(sensed.dcm[1]))
+        area = self.area(state, _SHRUNK)
+        if self.config.adapt_steps and support.margin(area, xi) < 0:
+            middle = state.anchors[:, :2].mean(axis=0)
+            yaw = float(state.anchors[:, 3].mean())
+            aside = rotate(-yaw, (xi[0] - middle[0], xi[1] - middle[1]))[1]
+            stance = RIGHT if aside > 0 else LEFT
+            step = catching(self.gait, stance, _pose(state.anchors, stance), state.zmp)
+            return state._replace(mode=Mode.STEP, step=step, landings=(), correction=STILL)
+        if not moving(velocity):
+            return state
+        stance = first_stance(velocity)
+        step = state.step._replace(stance=stance, foot=_pose(state.anchors, stance))
+        return state._replace(
+            mode=Mode.SHIFT, shift_left=self.config.shift_time, step=step, landings=(), correction=STILL
+        )
+
+    def _first_step(self, state: WalkerState, velocity: Velocity) -> WalkerState:
+        return self._begin(state, state.step.stance, state.zmp, velocity)
+
+    def _begin(self, state: WalkerState, stance: int, origin: Pair, velocity: Velocity) -> WalkerState:
+        foot = _pose(state.anchors, stance)
+        final = not moving(velocity)
+        wanted = STILL if final else _sum(velocity, state.correction)
+        ahead = chain(self.gait, by_command(self.gait, wanted, stance, foot[2]), final)
+        step = begin(self.gait, stance, foot, origin, ahead, wanted.omega * self.gait.step_time, final)
+        return state._replace(mode=Mode.STEP, step=step, plan_age=math.inf)
+
+    def _land(self, state: WalkerState, sensed: Estimate, velocity: Velocity) -> WalkerState:
+        landed = 1 - state.step.stance
+        anchors = state.anchors.copy()
+        anchors[landed] = sensed.soles[landed]
+        anchors[landed, 2] = 0.0
+        pose = _pose(anchors, landed)
+        landings = (*state.landings[-2:], Landing(state.t, landed, pose))
+        correction = state.correction
+        if moving(velocity) and not state.step.moved:
+            correction = corrected(correction, velocity, landings, self.gait, self.config)
+        state = state._replace(anchors=anchors, landings=landings, correction=correction)
+        if not moving(velocity) and side_by_side(self.gait, state.step.foot, pose):
+            return state._replace(mode=Mode.STAND, correction=STILL)
+        return self._begin(state, landed, state.step.foot[:2], velocity)
+
+    def _plan(self, state: WalkerState, wanted: Velocity, circles: tuple[Circle, ...]) -> tuple[WalkerState, Chain]:
+        """The previewed footsteps: from the predictive controller, or from the command alone."""
+        step = state.step
+        final = not moving(wanted)
+        steps = by_command(self.gait, wanted, step.stance, step.foot[2])
+        state = state._replace(step=step._replace(final=final, turn=wanted.omega * self.gait.step_time))
+        return state, chain(self.gait, steps, final)
+
+    def _adjusted(self, state: WalkerState, sensed: Estimate, ahead: Chain) -> tuple[WalkerState, Pair, Pair]:
+        """Place and time of the landing, the planned zero moment point, and the DCM that goes with them."""
+        xi = (float(sensed.dcm[0]), float(sensed.dcm[1]))
+        if state.mode == Mode.STAND:
+            x, y = state.anchors[:, :2].mean(axis=0).tolist()
+            return state, (x, y), (x, y)
+        step = state.step
+        if state.mode == Mode.SHIFT:
+            zmp = shift_zmp(self.gait, xi, step.foot[:2], ahead, max(state.shift_left, 0.05))
+            return state, zmp, xi
+        omega = self.gait.omega
+        foot, yaw = step.foot[:2], step.foot[2]
+        came = (foot[0] - step.origin[0], foot[1] - step.origin[1])
+        short = pendulum.ramp(omega, came, step.double_support - step.phase, step.double_support)
+        x0 = rotate(-yaw, (xi[0] - foot[0] - short[0], xi[1] - foot[1] - short[1]))
+        step = self._choose(step, x0, ahead)
+        state = state._replace(step=step)
+        goal = aim(step, ahead, self.gait)
+        decay = math.exp(-omega * max(step.end - step.phase, 0.0))
+        at_end = [(goal.kappa * step.landing[i] + goal.rest[i]) / goal.growth for i in (0, 1)]
+        ahead_of_foot = rotate(yaw, (at_end[0] * decay, at_end[1] * decay))
+        reference_dcm = (foot[0] + short[0] + ahead_of_foot[0], foot[1] + short[1] + ahead_of_foot[1])
+        share = min(step.phase / step.double_support, 1.0) if step.double_support > 0 else 1.0
+        zmp = (step.origin[0] + share * came[0], step.origin[1] + share * came[1])
+        return state, zmp, reference_dcm
+
+    def _choose(self, step: Step, x0: Pair, ahead: Chain) -> Step:
+        """The step with its landing adjusted."""
+        if step.end - step.phase < self.config.freeze:
+            return step
+        goal, limits = aim(step, ahead, self.gait), bounds(step, self.gait, self.config)
+        if not self.config.adapt_time:
+            limits = limits._replace(earliest=goal.end, latest=goal.end)
+        if not self.config.adapt_steps:
+            limits = limits._replace(least=goal.displacement, most=goal.displacement)
+        chosen = adjust(self.config.step, self.gait.omega, x0, step.phase, step.end, goal, limits)
+        far = math.hypot(chosen.displacement[0] - goal.displacement[0], chosen.displacement[1] - goal.displacement[1])
+        return step._replace(
+            landing=chosen.displacement, end=chosen.end, nominal=goal.displacement, moved=step.moved or far > _FAR
+        )
+
+    def _feedback(self, state: WalkerState, sensed: Estimate, zmp: Pair, dcm: Pair) -> Pair:
+        """p = p_ref + K (xi - xi_ref), within the soles that stand."""
+        gain = self.config.zmp_gain
+        wanted = (
+            zmp[0] + gain * (float(sensed.dcm[0]) - dcm[0]),
+            zmp[1] + gain * (float(sensed.dcm[1]) - dcm[1]),
+        )
+        middle = state.anchors[:, :2].mean(axis=0)
+        inside = zmp if state.mode == Mode.STEP else (float(middle[0]), float(middle[1]))
+        return support.clip(self.area(state, 1.0), inside, wanted)
+
+    def area(self, state: WalkerState, share: float) -> support.Corners:
+        """The area of the soles that stand, counter-clockwise."""
+        if state.mode == Mode.STEP and state.step.phase >= state.step.double_support:
+            return support.sole_corners(self.gait, *state.step.foot, share)
+        both = [support.sole_corners(self.gait, *_pose(state.anchors, side), share) for side in (LEFT, RIGHT)]
+        return support.hull([*both[0], *both[1]])
+
+    def _follow(self, state: WalkerState, sensed: Estimate, zmp: Pair) -> WalkerState:
+        """The centre of mass' reference: drawn to the measured one, then a tick of the pendulum over the new ZMP."""
+        config, omega = self.config, self.gait.omega
+        x, y, vx, vy = state.com
+        mx, my = float(sensed.com[0]), float(sensed.com[1])
+        ux, uy = float(sensed.com_velocity[0]), float(sensed.com_velocity[1])
+        most = config.offset_most
+        gain = TICK / config.offset_time
+        offset = (
+            min(max(state.offset[0] + gain * (x - mx), -most), most),
+            min(max(state.offset[1] + gain * (y - my), -most), most),
+        )
+        share = config.follow if config.follow_measured else 0.0
+        x, y, vx, vy = x + share * (mx - x), y + share * (my - y), vx + share * (ux - vx), vy + share * (uy - vy)
+        x, vx = pendulum.advance(omega, x, vx, zmp[0], TICK)
+        y, vy = pendulum.advance(omega, y, vy, zmp[1], TICK)
+        return state._replace(com=(x, y, vx, vy), offset=offset, zmp=zmp, load=self._load(state, zmp))
+
+    def _load(self, state: WalkerState, zmp: Pair) -> Pair:
+        """How the weight is shared by feet that both stand: by the ZMP's place on the line between them."""
+        if state.mode == Mode.STEP and state.step.phase >= state.step.double_support:
+            return (1.0, 0.0) if state.step.stance == LEFT else (0.0, 1.0)
+        (lx, ly), (rx, ry) = state.anchors[LEFT, :2].tolist(), state.anchors[RIGHT, :2].tolist()
+        dx, dy = lx - rx, ly - ry
+        share = ((zmp[0] - rx) * dx + (zmp[1] - ry) * dy) / max(dx * dx + dy * dy, 1e-9)
+        share = min(max(share, 0.0), 1.0)
+        return share, 1.0 - share
+
+    def _feet(self, state: WalkerState) -> Feet:
+        feet = Feet(state.feet, state.feet_velocity, state.feet_acceleration)
+        step = state.step
+        if state.mode != Mode.STEP or step.phase < step.double_support:
+            for side in (LEFT, RIGHT):
+                feet = rest(feet, side, state.anchors[side], TICK)
+            return feet
+        feet = rest(feet, step.stance, state.anchors[step.stance], TICK)
+        dx, dy = rotate(step.foot[2], step.landing)
+        goal = (step.foot[0] + dx, step.foot[1] + dy, step.foot[2] + step.turn)
+        done, left = step.phase - step.double_support, step.end - step.phase
+        return swing(feet, 1 - step.stance, goal, self.gait.step_height, done, left, TICK)
+
+    def _reference(self, state: WalkerState) -> Reference:
+        x, y, vx, vy = state.com
+        squared = self.gait.omega**2
+        com = np.array(
+            [
+                [x, y, self.gait.com_height],
+                [vx, vy, 0.0],
+                [squared * (x - state.zmp[0]), squared * (y - state.zmp[1]), 0.0],
+            ]
+        )
+        yaw = np.array([a[:, 3].mean() for a in (state.feet, state.feet_velocity, state.feet_acceleration)])
+        return Reference(
+            state.t,
+            com,
+            np.array(state.zmp),
+            yaw,
+            state.feet,
+            state.feet_velocity,
+            state.feet_acceleration,
+            np.array(state.load),
+        )
+
+    def _act(
+        self, state: WalkerState, reference: Reference, sensed: Estimate, wanted: Velocity
+    ) -> tuple[WalkerState, Action]:
+        started = time.perf_counter()
+        target = self._target(state, reference)
+        posture = solve_posture(self.model, state.q, target)
+        servo = posture.q[7:]
+        if self.config.feed_forward:
+            servo = servo + self._sag(posture.q, state)
+        took = 1e3 * (time.perf_counter() - started)
+        plan = state.plan if state.plan_age == 0 else None
+        action = Action(servo, reference, sensed, plan, took, float(posture.misses.max()), wanted)
+        return state._replace(q=posture.q), action
+
+    def _target(self, state: WalkerState, reference: Reference) -> PostureTarget:
+        com = reference.com[0].copy()
+        com[:2] += state.offset
+        heading = _turned(float(reference.yaw[0]))
+        soles = np.stack([_turned(float(yaw)) for yaw in reference.feet[:, 3]])
+        return PostureTarget(com, reference.feet[:, :3], soles, heading, heading, self._weights(state))
+
+    def _weights(self, state: WalkerState) -> Float[np.ndarray, "21"]:
+        """Of the rows of the inverse kinematics: the swing foot's pitch is free at first, and held when it lands."""
+        weights = WEIGHTS.copy()
+        step = state.step
+        if not self.config.release_pitch or state.mode != Mode.STEP or step.phase < step.double_support:
+            return weights
+        share = (step.phase - step.double_support) / max(step.end - step.double_support, TICK)
+        held = min(max((share - 0.5) / 0.4, 0.0), 1.0)
+        weights[_PITCH_ROW[1 - step.stance]] *= _FREE + (1 - _FREE) * held
+        return weights
+
+    def _sag(self, q: Float[np.ndarray, " positions"], state: WalkerState) -> Float[np.ndarray, " joints"]:
+        """How far the servos must be commanded ahead so as to hold their load [rad]."""
+        cop = np.array([_seen_from(_pose(state.anchors, side), state.zmp) for side in (LEFT, RIGHT)])
+        torque = static_torques(self.model, q, np.array(state.load), cop)
+        return np.clip(torque, -self.humanoid.effort, self.humanoid.effort) / self.humanoid.stiffness
+
+
+_FAR = 0.03  # a landing this far from the plan was moved by a push, not by the gait's own error [m]
+_FREE = 0.03
+_PITCH_ROW = (7, 13)  # com 3, then each sole: position 3, rotation 3 about its own x, y, z
+
+
+def walker(humanoid: Humanoid, config: WalkConfig | None = None) -> Walker:
+    """A humanoid, ready to walk."""
+    return Walker(humanoid, config or WalkConfig(), observer(humanoid, posture_model(humanoid)))
+
+
+def _turned(yaw: float) -> Float[np.ndarray, "3 3"]:
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _pose(poses: Float[np.ndarray, "2 4"], side: int) -> Pose:
+    x, y, _, yaw = poses[side].tolist()
+    return x, y, yaw
+
+
+def _seen_from(pose: Pose, point: Pair) -> Pair:
+    """A point of the floor in a sole's frame [m]."""
+    return rotate(-pose[2], (point[0] - pose[0], point[1] - pose[1]))
+
+
+def _sum(a: Velocity, b: Velocity) -> Velocity:
+    return Velocity(a.vx + b.vx, a.vy + b.vy, a.omega + b.omega)
