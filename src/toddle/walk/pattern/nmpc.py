@@ -1,0 +1,365 @@
+"""The walking controller: a few footsteps and the motion of the centre of mass, from where the robot is now.
+
+Huber 2019, section 2.1.3, in a reduced form: the future feet's yaws stand in for the 2 N yaw jerks; the feet are drawn
+to the displacements that follow from the command (`displacement`), without which the printed objective under-tracks;
+the ZMP's reference passes from foot to foot during double support, so an iteration may begin at any moment of a step
+and end it at any time. Gauss-Newton, one step an iteration: yaws are linearised at those of the command, to which a
+strong residual ties them, feet and ZMP at the last plan.
+
+Foot hulls and relative yaw are hard rows and can always be kept. ZMP and clearance are soft, so that there always is
+an answer; ``violation`` and ``overlap`` say by how much they are exceeded. An answer that is late, not finite or
+breaks a hard row isn't used: the last plan is, shifted to now.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from toddle.robots.gait import Gait
+from toddle.robots.humanoid import LEFT
+from toddle.signals import Footstep, Velocity
+from toddle.walk.pattern.displacement import Pair, displacements
+from toddle.walk.pattern.feasible import landing_hull
+from toddle.walk.pattern.nmpc_kernels import Moment, Numbers, Tables, assemble, unfold
+from toddle.walk.pattern.obstacles import NONE, near
+from toddle.walk.pattern.plan import Status
+from toddle.walk.pattern.quadratic import least_distance
+from toddle.walk.pattern.time_stepping import time_stepping
+
+STILL = Velocity(0.0, 0.0, 0.0)
+
+NEVER = -1
+"""``halt`` of a robot that walks on."""
+
+GAP = 0.01
+"""Kept between a sole and an obstacle [m]."""
+
+_STILL = 1e6  # weight of the displacement that ends with both feet side by side
+_LAST = 1e-3  # without displacements, a foot that no cost touches is held by this share of beta
+_BROKEN = 1e-5  # a hard row may be exceeded by so much [m], [rad]
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Of the objective: 2.43 to 2.46, and two more.
+
+    Attributes:
+        alpha: of the velocity.
+        beta: of the ZMP's distance from its reference.
+        gamma: of the jerk.
+        delta: of a footstep's distance from its displacement.
+        yaw: of a turn's distance from the commanded one.
+    """
+
+    alpha: float = 0.01
+    beta: float = 1e2
+    gamma: float = 1e-5
+    delta: float = 1e3
+    yaw: float = 1e5
+
+
+def document_weights(gait: Gait) -> Weights:
+    """The weights that the document prints for a gait; no displacements."""
+    alpha, beta, gamma = gait.objective
+    return Weights(alpha, beta, gamma, 0.0)
+
+
+@dataclass(frozen=True)
+class Nmpc:
+    """What doesn't change between iterations. Made by `nmpc`.
+
+    Attributes:
+        gait: how the robot steps.
+        weights: of the objective.
+        tables: time-stepping and factor.
+        numbers: weights and lengths, for the kernels.
+        freeze: the next landing is no longer moved so shortly before it [s].
+    """
+
+    gait: Gait
+    weights: Weights
+    tables: Tables
+    numbers: Numbers
+    freeze: float
+
+
+class PlanState(NamedTuple):
+    """Where the robot is, in the plan's frame.
+
+    Attributes:
+        com: x and y of the centre of mass: position, velocity, acceleration (omega^2 (c - p)) [m, s].
+        support: the sole that carries in this step.
+        lifted: where the other sole stood when this step began.
+        origin: where the ZMP was when this step began [m]: the other sole, or between the feet out of standing.
+        phase: time since this step began [s].
+        remaining: until it ends [s]; any, the following steps take the gait's time.
+        double_support: how long the weight takes to come over from ``origin`` [s].
+        halt: the robot stands after so many landings, with both feet side by side; 0: it stands; `NEVER`.
+    """
+
+    com: Float[np.ndarray, "2 3"]
+    support: Footstep
+    lifted: Footstep
+    origin: Pair
+    phase: float
+    remaining: float
+    double_support: float
+    halt: int = NEVER
+
+
+class Plan(NamedTuple):
+    """An iteration's answer; ``feet`` and the rest are usable whatever the status is.
+
+    Attributes:
+        feet: the landings to come: x, y [m], yaw [rad]; the first is that of the foot in the air.
+        displacement: of each landing from the one before, the first from the support foot [m].
+        jerk: of x and y until the next sample [m/s^3].
+        jerks: over the horizon.
+        zmp: reference at the samples [m].
+        status: solved, or why this is the last plan shifted.
+        milliseconds: the iteration took, wall clock.
+        obstacle: a clearance decides the plan.
+        violation: of the soft ZMP rows, the greatest [m].
+        overlap: of the soft clearance rows, the greatest [m].
+        state: it was made at.
+    """
+
+    feet: Float[np.ndarray, "steps 3"]
+    displacement: Float[np.ndarray, "steps 2"]
+    jerk: Float[np.ndarray, "2"]
+    jerks: Float[np.ndarray, "2 samples"]
+    zmp: Float[np.ndarray, "samples 2"]
+    status: Status
+    milliseconds: float
+    obstacle: bool
+    violation: float
+    overlap: float
+    state: PlanState
+
+
+def nmpc(gait: Gait, weights: Weights | None = None, *, freeze: float = 0.06, body: float | None = None) -> Nmpc:
+    """The problem of a gait.
+
+    Args:
+        gait: how the robot steps.
+        weights: of the objective; None: the defaults, which track the command.
+        freeze: the next landing is no longer moved so shortly before it [s].
+        body: radius kept from obstacles around the centre of mass [m]; None: half the foot distance and 0.12.
+    """
+    weights = weights or Weights()
+    step = time_stepping(gait.preview, gait.sample, gait.com_height)
+    hessian = (
+        weights.alpha * step.velocity_jerk.T @ step.velocity_jerk
+        + weights.beta * step.zmp_jerk.T @ step.zmp_jerk
+        + weights.gamma * np.eye(gait.preview)
+    )
+    upper = np.linalg.cholesky(hessian[::-1, ::-1])[::-1, ::-1]
+    inverse = np.ascontiguousarray(np.linalg.inv(upper))
+    moved = [np.ascontiguousarray(u @ inverse.T) for u in (step.position_jerk, step.velocity_jerk, step.zmp_jerk)]
+    hull = landing_hull(gait)
+    tables = Tables(
+        step.position_state, step.velocity_state, step.zmp_state, step.zmp_jerk, step.position_jerk, *moved, inverse,
+        hull.rows,
+    )  # fmt: skip
+    front, rear = (gait.foot_ahead + way * (gait.foot_length / 2 - gait.margin[0]) for way in (1, -1))
+    numbers = Numbers(
+        alpha=weights.alpha,
+        beta=weights.beta,
+        delta=weights.delta,
+        still=max(_STILL, weights.delta),
+        last=0.0 if weights.delta > 0 else _LAST * weights.beta,
+        yaw=math.sqrt(weights.yaw),
+        step_time=gait.step_time,
+        double_support=gait.double_support,
+        sample=gait.sample,
+        longest_turn=gait.longest_turn,
+        rear=min(rear, 0.0),
+        front=max(front, 0.0),
+        side=gait.foot_width / 2 - gait.margin[1],
+        half_length=gait.foot_length / 2,
+        half_width=gait.foot_width / 2,
+        ahead=gait.foot_ahead,
+        gap=GAP,
+        body=gait.foot_distance / 2 + 0.12 if body is None else body,
+        reach=hull.reach,
+    )
+    return Nmpc(gait, weights, tables, numbers, freeze)
+
+
+def plan(
+    problem: Nmpc,
+    state: PlanState,
+    velocity: Velocity,
+    circles: Float[np.ndarray, "circles 3"] = NONE,
+    last: Plan | None = None,
+    deadline_ms: float | None = None,
+) -> Plan:
+    """One iteration. Never raises, and never returns a number that isn't finite.
+
+    Args:
+        problem: of the gait.
+        state: where the robot is.
+        velocity: commanded; its direction turns with the robot. A robot that is to halt takes none.
+        circles: obstacles in the plan's frame: centre and radius [m].
+        last: the last plan, of this or of the step before; None: there is none.
+        deadline_ms: an answer that took longer isn't used.
+    """
+    began = time.perf_counter_ns()
+    velocity = velocity if state.halt == NEVER else STILL
+    guess = nominal(problem, state, velocity) if last is None else shifted(problem, last, state, velocity)
+    if not _finite(state, velocity, circles):
+        return guess._replace(status=Status.NOT_FINITE, milliseconds=_since(began))
+    found = _solve(problem, state, velocity, circles, guess, deadline_ms, last is not None)
+    taken = _since(began)
+    if deadline_ms is not None and taken > deadline_ms and found.status == Status.SOLVED:
+        return guess._replace(status=Status.LATE, milliseconds=taken)
+    return found._replace(milliseconds=taken)
+
+
+def _solve(
+    problem: Nmpc,
+    state: PlanState,
+    velocity: Velocity,
+    circles: Float[np.ndarray, "circles 3"],
+    guess: Plan,
+    deadline_ms: float | None,
+    known: bool,
+) -> Plan:
+    """Linearised at ``guess``; which is the answer where there is no better one."""
+    problem_numbers, foot = problem.numbers, state.support
+    yaws = turned(problem, foot.yaw, velocity)
+    drawn = drawn_to(problem, state, velocity)
+    com = np.array(state.com)
+    com[0, 0] -= foot.x
+    com[1, 0] -= foot.y
+    feet = guess.feet - np.array([foot.x, foot.y, 0.0])
+    wide = problem.gait.steps * problem_numbers.reach + problem_numbers.body + 0.5
+    around = near(circles, foot.x, foot.y, wide) if len(circles) else NONE
+    pinned = known and 0 < state.remaining <= problem.freeze and state.halt != 0
+    tables, moment = problem.tables, _moment(state, velocity)
+    matrix, low, high, marks, y, lower, inverse, shares, hard, zmp = assemble(
+        tables, problem_numbers, moment, com, drawn, yaws, feet, guess.jerks, around, pinned
+    )
+    answer = least_distance(matrix, low, high, marks, None if deadline_ms is None else deadline_ms / 1e3)
+    if answer.status != Status.SOLVED:
+        return guess._replace(status=answer.status)
+    jerks, steps, worst, active, finite = unfold(
+        answer.u, tables, problem_numbers, matrix, low, high, y, lower, inverse, yaws, hard, zmp
+    )
+    if not finite or worst[0] > _BROKEN:
+        return guess._replace(status=Status.NOT_FINITE if not finite else Status.INFEASIBLE)
+    displacement = np.diff(steps[:, :2], axis=0, prepend=0.0)
+    steps[:, 0] += foot.x
+    steps[:, 1] += foot.y
+    reference = shares[:, 2:] @ steps[:, :2] + shares[:, :1] * np.array(state.origin)
+    reference += shares[:, 1:2] * np.array([foot.x, foot.y])
+    return Plan(
+        steps, displacement, jerks[:, 0].copy(), jerks, reference, Status.SOLVED, 0.0, bool(active), float(worst[1]),
+        float(worst[2]), state,
+    )  # fmt: skip
+
+
+def turned(problem: Nmpc, yaw: float, velocity: Velocity) -> Float[np.ndarray, " soles"]:
+    """Yaws by the command: of the support foot and of the landings to come [rad]."""
+    most = problem.gait.longest_turn
+    turn = min(max(velocity.omega * problem.gait.step_time, -most), most)
+    return yaw + turn * np.arange(problem.gait.steps + 1)
+
+
+def drawn_to(problem: Nmpc, state: PlanState, velocity: Velocity) -> Float[np.ndarray, "steps 2"]:
+    """Displacements by the command, each from the foot before [m]."""
+    gait, foot = problem.gait, state.support
+    return np.array(displacements(gait.foot_distance, gait.step_time, velocity, foot.side, foot.yaw, gait.steps))
+
+
+def nominal(problem: Nmpc, state: PlanState, velocity: Velocity) -> Plan:
+    """The plan that follows from the command alone: no jerk. Numbers that aren't finite count as 0."""
+    state = _usable(state)
+    velocity = velocity if all(map(math.isfinite, velocity)) else STILL
+    drawn, yaws = drawn_to(problem, state, velocity), turned(problem, state.support.yaw, velocity)
+    feet = np.column_stack([np.array([state.support.x, state.support.y]) + drawn.cumsum(axis=0), yaws[1:]])
+    count = problem.gait.preview
+    zmp = np.repeat(np.array([[state.support.x, state.support.y]]), count, axis=0)
+    return Plan(feet, drawn, np.zeros(2), np.zeros((2, count)), zmp, Status.SOLVED, 0.0, False, 0.0, 0.0, state)
+
+
+def shifted(problem: Nmpc, last: Plan, state: PlanState, velocity: Velocity) -> Plan:
+    """The last plan, seen from now: a landing that has been is dropped, and one more is added by the command."""
+    before = last.state
+    switched = state.support.side != before.support.side
+    elapsed = before.remaining + state.phase if switched else state.phase - before.phase
+    if not math.isfinite(elapsed):
+        return last
+    count = problem.gait.preview
+    late = min(max(round(elapsed / problem.gait.sample), 0), count)
+    jerks, zmp, feet, drawn = last.jerks, last.zmp, last.feet, last.displacement
+    if late:
+        jerks = np.concatenate([jerks[:, late:], np.zeros((2, late))], axis=1)
+        zmp = np.concatenate([zmp[late:], np.repeat(zmp[-1:], late, axis=0)])
+    if switched:
+        speed = velocity if all(map(math.isfinite, velocity)) else STILL
+        side = (before.support.side + len(feet)) % 2
+        end = Footstep(side, *feet[-1])
+        gait = problem.gait
+        step = displacements(gait.foot_distance, gait.step_time, speed, end.side, end.yaw, 1)[0]
+        turn = turned(problem, end.yaw, speed)[1]
+        feet = np.concatenate([feet[1:], [[end.x + step[0], end.y + step[1], turn]]])
+        drawn = np.concatenate([drawn[1:], [step]])
+    return last._replace(
+        feet=feet, displacement=drawn, jerk=jerks[:, 0].copy(), jerks=jerks, zmp=zmp, state=_usable(state)
+    )
+
+
+def _moment(state: PlanState, velocity: Velocity) -> Moment:
+    foot = state.support
+    return Moment(
+        foot.yaw,
+        1.0 if foot.side == LEFT else -1.0,
+        state.lifted.x - foot.x,
+        state.lifted.y - foot.y,
+        state.origin[0] - foot.x,
+        state.origin[1] - foot.y,
+        float(state.phase),
+        float(state.remaining),
+        float(state.double_support),
+        float(state.halt),
+        float(velocity.vx),
+        float(velocity.vy),
+        float(velocity.omega),
+    )
+
+
+def _finite(state: PlanState, velocity: Velocity, circles: Float[np.ndarray, "circles 3"]) -> bool:
+    foot, other = state.support, state.lifted
+    total = foot.x + foot.y + foot.yaw + other.x + other.y + other.yaw + state.origin[0] + state.origin[1]
+    total += state.phase + state.remaining + state.double_support + velocity.vx + velocity.vy + velocity.omega
+    return math.isfinite(total + float(state.com.sum()) + (float(circles.sum()) if len(circles) else 0.0))
+
+
+def _usable(state: PlanState) -> PlanState:
+    """The state with 0 for each number that isn't finite."""
+    numbers = (*state.support[1:], *state.lifted[1:], *state.origin, *state[4:7], *state.com.flat)
+    if all(map(math.isfinite, numbers)):
+        return state
+
+    def usable(number: float) -> float:
+        return number if math.isfinite(number) else 0.0
+
+    return PlanState(
+        np.nan_to_num(state.com, nan=0.0, posinf=0.0, neginf=0.0),
+        Footstep(state.support.side, *map(usable, state.support[1:])),
+        Footstep(state.lifted.side, *map(usable, state.lifted[1:])),
+        (usable(state.origin[0]), usable(state.origin[1])),
+        *map(usable, state[4:7]),
+        state.halt,
+    )
+
+
+def _since(began: int) -> float:
+    return (time.perf_counter_ns() - began) / 1e6

@@ -1,0 +1,444 @@
+"""The compiled part of the reduced walking controller: its quadratic programme as a least-distance problem, and back.
+
+Huber 2019, 2.43 to 2.86, with future foot yaws instead of yaw jerks, and footsteps drawn to displacements (delta).
+Unknowns: for x and for y N jerks and F feet, then F changes of the feet's yaws. With the Hessian of an axis
+
+    H = [[J, -beta U'V], [., beta V'V + delta ...]] = L L',   L = [[R, 0], [L_F, C]],   u = L' x + L^-1 g
+
+the programme is min |u|^2 / 2 with rows M = A L'^-1. R is constant, so only the F x F corner is factored at run time,
+and the dense part of M consists of rows computed once (`Tables`). R is upper triangular: as the time-stepping is lower
+triangular, so are those rows. Everything is relative to the foot that stands.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+SOFT = 8  # DAQP's mark of a row that may be violated
+FOOT_PATH = (1.0, 0.7, 0.35)  # where a swing foot is kept clear: shares of its way, landing first
+BODY_ROWS = 4  # how often the body is kept clear over the horizon
+
+
+class Tables(NamedTuple):
+    """What doesn't change between iterations; ``w_`` are rows of the time-stepping times the inverse of R'."""
+
+    position_state: np.ndarray
+    velocity_state: np.ndarray
+    zmp_state: np.ndarray
+    zmp_jerk: np.ndarray
+    position_jerk: np.ndarray
+    w_position: np.ndarray
+    w_velocity: np.ndarray
+    w_zmp: np.ndarray
+    inverse: np.ndarray
+    hull: np.ndarray
+
+
+class Numbers(NamedTuple):
+    """Weights and lengths, see `nmpc.Nmpc`."""
+
+    alpha: float
+    beta: float
+    delta: float
+    still: float
+    last: float
+    yaw: float
+    step_time: float
+    double_support: float
+    sample: float
+    longest_turn: float
+    rear: float
+    front: float
+    side: float
+    half_length: float
+    half_width: float
+    ahead: float
+    gap: float
+    body: float
+    reach: float
+
+
+class Moment(NamedTuple):
+    """What changes: floats that tell the state of the step, positions relative to the foot that stands."""
+
+    yaw: float
+    sign: float
+    swing_x: float
+    swing_y: float
+    origin_x: float
+    origin_y: float
+    phase: float
+    remaining: float
+    double_support: float
+    halt: float
+    vx: float
+    vy: float
+    omega: float
+
+
+@njit(cache=True)
+def selection(count, feet, sample, phase, remaining, first, later, step_time, halt):
+    """Shares of the ZMP's reference: origin, the foot that stands, the feet to come; one row each sample.
+
+    l_k rises from 0 to 1 over the double support that begins when foot k lands (k = 0: began with this step).
+    After the landing ``halt`` (negative: never) the weight stays half-way.
+    """
+    shares = np.zeros((count, feet + 2))
+    for i in range(count):
+        t = (i + 1) * sample
+        over = min(1.0, (phase + t) / max(first, 1e-9))
+        if halt == 0:
+            over *= 0.5
+        shares[i, 0] = 1.0 - over
+        for k in range(1, feet + 1):
+            share = min(max((t - remaining - (k - 1) * step_time) / max(later, 1e-9), 0.0), 1.0)
+            if 0 <= halt < k:
+                share = 0.0
+            elif halt == k:
+                share *= 0.5
+            share = min(share, over)
+            shares[i, k] = over - share
+            over = share
+        shares[i, feet + 1] = over
+    return shares
+
+
+@njit(cache=True)
+def corner(tables, numbers, shares, halt):
+    """L_F and the inverse of C: what the feet add to the factor of one axis's Hessian."""
+    count, feet = shares.shape[0], shares.shape[1] - 2
+    v = np.ascontiguousarray(shares[:, 2:])
+    lower = -numbers.beta * (v.T @ tables.w_zmp)
+    h = numbers.beta * (v.T @ v) - lower @ lower.T
+    for k in range(feet):
+        weight = numbers.still if k + 1 == halt else numbers.delta
+        h[k, k] += weight + numbers.last
+        if k > 0:
+            h[k - 1, k - 1] += weight
+            h[k, k - 1] -= weight
+            h[k - 1, k] -= weight
+    inverse = np.zeros((feet, feet))
+    c = np.linalg.cholesky(h)
+    for j in range(feet):
+        for i in range(j, feet):
+            total = 1.0 if i == j else 0.0
+            for k in range(j, i):
+                total -= c[i, k] * inverse[k, j]
+            inverse[i, j] = total / c[i, i]
+    return lower, inverse
+
+
+@njit(cache=True)
+def gradient(tables, numbers, moment, shares, lower, inverse, com, steps, last_feet, drift, target):
+    """L^-1 g of both axes; ``drift`` takes the ZMP less its reference without any unknown, at each sample."""
+    count, feet = shares.shape[0], shares.shape[1] - 2
+    y = np.zeros((2, count + feet))
+    origin = (moment.origin_x, moment.origin_y)
+    for axis in range(2):
+        for i in range(count):
+            z = 0.0
+            v = 0.0
+            for j in range(3):
+                z += tables.zmp_state[i, j] * com[axis, j]
+                v += tables.velocity_state[i, j] * com[axis, j]
+            drift[i, axis] = z - shares[i, 0] * origin[axis]
+            by_speed = numbers.alpha * (v - target[i, axis])
+            by_zmp = numbers.beta * drift[i, axis]
+            for j in range(i + 1):
+                y[axis, j] += by_speed * tables.w_velocity[i, j] + by_zmp * tables.w_zmp[i, j]
+        rest = np.zeros(feet)
+        for k in range(feet):
+            weight = numbers.still if k + 1 == moment.halt else numbers.delta
+            rest[k] -= weight * steps[k, axis] + numbers.last * last_feet[k, axis]
+            if k > 0:
+                rest[k - 1] += weight * steps[k, axis]
+            for i in range(count):
+                rest[k] -= numbers.beta * shares[i, k + 2] * drift[i, axis]
+            for j in range(count):
+                rest[k] -= lower[k, j] * y[axis, j]
+        for k in range(feet):
+            for j in range(k + 1):
+                y[axis, count + k] += inverse[k, j] * rest[j]
+    return y
+
+
+@njit(cache=True)
+def heading(moment, step_time, t):
+    """Yaw of the body some time ahead: the foot's that stands, at the middle of its step."""
+    return moment.yaw + moment.omega * (moment.phase + t - step_time / 2)
+
+
+@njit(cache=True)
+def add_foot(row, inverse, count, feet, k, x, y):
+    """Adds the coefficients of foot k (0: the next one) to a row; k < 0 is a foot that stands already."""
+    if k < 0:
+        return
+    for j in range(k, feet):
+        row[count + j] += x * inverse[j, k]
+        row[2 * count + feet + j] += y * inverse[j, k]
+
+
+@njit(cache=True)
+def add_yaw(row, numbers, count, feet, k, slope):
+    """Adds the slope by the yaw of foot k, which is the sum of the changes up to it."""
+    for j in range(k + 1):
+        row[2 * (count + feet) + j] += slope / numbers.yaw
+
+
+@njit(cache=True)
+def add_motion(row, table, base, count, feet, i, x, y):
+    """Adds a row of the time-stepping (jerks) and its share of the feet, along both axes."""
+    for j in range(i + 1):
+        row[j] += x * table[i, j]
+        row[count + feet + j] += y * table[i, j]
+    for j in range(feet):
+        row[count + j] += x * base[i, j]
+        row[2 * count + feet + j] += y * base[i, j]
+
+
+@njit(cache=True)
+def foot_rows(matrix, low, high, tables, numbers, moment, inverse, yaws, last, pinned):
+    """Hull of each landing (2.70 to 2.78) and the relative yaw; a landing that comes too soon is held as it was."""
+    feet = inverse.shape[0]
+    count = tables.inverse.shape[0]
+    m = 0
+    if pinned:
+        for axis in range(2):
+            add_foot(matrix[m], inverse, count, feet, 0, 1.0 - axis, float(axis))
+            low[m] = high[m] = last[0, axis]
+            m += 1
+        add_yaw(matrix[m], numbers, count, feet, 0, 1.0)
+        low[m] = high[m] = last[0, 2] - yaws[1]
+        m += 1
+    for k in range(1 if pinned else 0, feet):
+        side = -moment.sign if k % 2 == 0 else moment.sign
+        cos, sin = math.cos(yaws[k]), math.sin(yaws[k])
+        dx = last[k, 0] - (last[k - 1, 0] if k > 0 else 0.0)
+        dy = last[k, 1] - (last[k - 1, 1] if k > 0 else 0.0)
+        for e in range(tables.hull.shape[0]):
+            nx, ny = tables.hull[e, 0], tables.hull[e, 1] * side
+            x, y = cos * nx - sin * ny, sin * nx + cos * ny
+            add_foot(matrix[m], inverse, count, feet, k, x, y)
+            add_foot(matrix[m], inverse, count, feet, k - 1, -x, -y)
+            if k > 0:
+                add_yaw(matrix[m], numbers, count, feet, k - 1, x * dy - y * dx)
+            low[m], high[m] = -1e30, tables.hull[e, 2]
+            m += 1
+        matrix[m, 2 * (count + feet) + k] = 1.0 / numbers.yaw
+        low[m] = -numbers.longest_turn - (yaws[k + 1] - yaws[k])
+        high[m] = numbers.longest_turn - (yaws[k + 1] - yaws[k])
+        m += 1
+    return m
+
+
+@njit(cache=True)
+def zmp_rows(matrix, low, high, m, tables, numbers, shares, base, drift, error, yaws):
+    """The zero moment point stays in the shrunk sole around its reference (2.65 to 2.69), turned by the yaws' mean."""
+    count, feet = shares.shape[0], shares.shape[1] - 2
+    for i in range(count):
+        yaw = (shares[i, 0] + shares[i, 1]) * yaws[0]
+        for k in range(feet):
+            yaw += shares[i, k + 2] * yaws[k + 1]
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        for axis in range(2):
+            x, y = (cos, sin) if axis == 0 else (-sin, cos)
+            add_motion(matrix[m], tables.w_zmp, base, count, feet, i, x, y)
+            slope = x * error[i, 1] - y * error[i, 0]
+            for k in range(feet):
+                add_yaw(matrix[m], numbers, count, feet, k, shares[i, k + 2] * slope)
+            known = x * drift[i, 0] + y * drift[i, 1]
+            low[m] = (numbers.rear if axis == 0 else -numbers.side) - known
+            high[m] = (numbers.front if axis == 0 else numbers.side) - known
+            m += 1
+    return m
+
+
+@njit(cache=True)
+def swing_share(phase, first, remaining):
+    """How much of the swing foot's way lies behind it: the fifth-order polynomial of 2.97 to 2.110."""
+    s = min(max((phase - first) / max(phase + remaining - first, 1e-9), 0.0), 1.0)
+    return s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
+
+
+@njit(cache=True)
+def foot_clearance(matrix, low, m, numbers, moment, inverse, yaws, last, circles):
+    """Each previewed foot keeps clear of each circle, where it lands and on its way:
+
+    n.((1 - b) S + b F + R offset - o) >= r + gap + h(n), n frozen at the last plan: then the sole is outside for sure.
+    """
+    feet = inverse.shape[0]
+    count = (matrix.shape[1] - 3 * feet) // 2
+    behind = swing_share(moment.phase, moment.double_support, moment.remaining)
+    for k in range(feet):
+        if 0 <= moment.halt < k + 1:
+            break
+        cos, sin = math.cos(yaws[k + 1]), math.sin(yaws[k + 1])
+        sx, sy = moment.swing_x, moment.swing_y
+        if k == 1:
+            sx = sy = 0.0
+        elif k > 1:
+            sx, sy = last[k - 2, 0], last[k - 2, 1]
+        for c in range(circles.shape[0]):
+            distance = math.hypot(circles[c, 0], circles[c, 1]) - circles[c, 2]
+            if distance > (k + 1) * numbers.reach + numbers.half_length + abs(numbers.ahead) + numbers.gap:
+                continue
+            for b in FOOT_PATH:
+                if k == 0 and b < 1.0 and b <= behind:
+                    continue
+                px = (1 - b) * sx + b * last[k, 0] + cos * numbers.ahead - circles[c, 0]
+                py = (1 - b) * sy + b * last[k, 1] + sin * numbers.ahead - circles[c, 1]
+                length = math.hypot(px, py)
+                nx, ny = (px / length, py / length) if length > 1e-6 else (-sin, cos)
+                along, aside = nx * cos + ny * sin, ny * cos - nx * sin
+                add_foot(matrix[m], inverse, count, feet, k, b * nx, b * ny)
+                known = -nx * circles[c, 0] - ny * circles[c, 1] + along * numbers.ahead
+                if k > 1:
+                    add_foot(matrix[m], inverse, count, feet, k - 2, (1 - b) * nx, (1 - b) * ny)
+                else:
+                    known += (1 - b) * (nx * sx + ny * sy)
+                half = numbers.half_length * abs(along) + numbers.half_width * abs(aside)
+                # n.ex grows by n.ey, and n.ey by -n.ex, as the foot turns
+                slope = numbers.ahead * aside - numbers.half_length * math.copysign(aside, along * aside)
+                slope += numbers.half_width * math.copysign(along, along * aside)
+                add_yaw(matrix[m], numbers, count, feet, k, slope)
+                low[m] = circles[c, 2] + numbers.gap + half - known
+                m += 1
+    return m
+
+
+@njit(cache=True)
+def body_clearance(matrix, low, m, tables, numbers, lower, inverse, com, jerks, circles):
+    """The centre of mass keeps the body's radius from each circle, at a few instants."""
+    count, feet = tables.inverse.shape[0], inverse.shape[0]
+    for b in range(1, BODY_ROWS + 1):
+        i = max(b * count // BODY_ROWS, 1) - 1
+        x = y = 0.0
+        for j in range(3):
+            x += tables.position_state[i, j] * com[0, j]
+            y += tables.position_state[i, j] * com[1, j]
+        rest = np.zeros(feet)
+        for k in range(feet):
+            total = 0.0
+            for j in range(i + 1):
+                total -= lower[k, j] * tables.w_position[i, j]
+            for j in range(k, feet):
+                rest[j] += inverse[j, k] * total
+        px, py = x, y
+        for j in range(i + 1):
+            px += tables.position_jerk[i, j] * jerks[0, j]
+            py += tables.position_jerk[i, j] * jerks[1, j]
+        for c in range(circles.shape[0]):
+            away = math.hypot(px - circles[c, 0], py - circles[c, 1])
+            if away < 1e-6 or away - circles[c, 2] > numbers.body + 2.0 * numbers.reach:
+                continue
+            nx, ny = (px - circles[c, 0]) / away, (py - circles[c, 1]) / away
+            for j in range(i + 1):
+                matrix[m, j] = nx * tables.w_position[i, j]
+                matrix[m, count + feet + j] = ny * tables.w_position[i, j]
+            for j in range(feet):
+                matrix[m, count + j] = nx * rest[j]
+                matrix[m, 2 * count + feet + j] = ny * rest[j]
+            low[m] = circles[c, 2] + numbers.body - nx * (x - circles[c, 0]) - ny * (y - circles[c, 1])
+            m += 1
+    return m
+
+
+@njit(cache=True)
+def assemble(tables, numbers, moment, com, steps, yaws, last, jerks, circles, pinned):
+    """The least-distance problem: rows, bounds, marks; and what `unfold` needs to go back.
+
+    ``com`` 2 x 3, ``steps`` F x 2 displacements, ``yaws`` F + 1 (the standing foot's first), ``last`` F x 3 the last
+    plan's feet, ``jerks`` 2 x N the last plan's, ``circles`` C x 3; positions relative to the foot that stands.
+    """
+    count, feet = tables.inverse.shape[0], steps.shape[0]
+    wide = 2 * count + 3 * feet
+    shares = selection(
+        count,
+        feet,
+        numbers.sample,
+        moment.phase,
+        moment.remaining,
+        moment.double_support,
+        numbers.double_support,
+        numbers.step_time,
+        moment.halt,
+    )
+    lower, inverse = corner(tables, numbers, shares, moment.halt)
+    target = np.empty((count, 2))
+    for i in range(count):
+        psi = heading(moment, numbers.step_time, (i + 1) * numbers.sample)
+        target[i, 0] = math.cos(psi) * moment.vx - math.sin(psi) * moment.vy
+        target[i, 1] = math.sin(psi) * moment.vx + math.cos(psi) * moment.vy
+    drift = np.empty((count, 2))
+    y = gradient(tables, numbers, moment, shares, lower, inverse, com, steps, last, drift, target)
+    base = np.zeros((count, feet))
+    error = drift.copy()
+    for i in range(count):
+        for k in range(feet):
+            value = -shares[i, k + 2]
+            for axis in range(2):
+                error[i, axis] -= shares[i, k + 2] * last[k, axis]
+            for j in range(i + 1):
+                value -= lower[k, j] * tables.w_zmp[i, j]
+            for j in range(k, feet):
+                base[i, j] += inverse[j, k] * value
+        for j in range(i + 1):
+            error[i, 0] += tables.zmp_jerk[i, j] * jerks[0, j]
+            error[i, 1] += tables.zmp_jerk[i, j] * jerks[1, j]
+    most = feet * (tables.hull.shape[0] + 1) + 3 + 2 * count + circles.shape[0] * (3 * feet + BODY_ROWS)
+    matrix = np.zeros((most, wide))
+    low, high = np.empty(most), np.full(most, 1e30)
+    hard = foot_rows(matrix, low, high, tables, numbers, moment, inverse, yaws, last, pinned)
+    zmp = zmp_rows(matrix, low, high, hard, tables, numbers, shares, base, drift, error, yaws)
+    m = zmp
+    if circles.shape[0] > 0:
+        m = foot_clearance(matrix, low, m, numbers, moment, inverse, yaws, last, circles)
+        m = body_clearance(matrix, low, m, tables, numbers, lower, inverse, com, jerks, circles)
+    marks = np.zeros(m, np.int32)
+    marks[hard:] = SOFT
+    for i in range(m):
+        shift = 0.0
+        for j in range(count + feet):
+            shift += matrix[i, j] * y[0, j] + matrix[i, count + feet + j] * y[1, j]
+        low[i] += shift
+        if high[i] < 1e29:
+            high[i] += shift
+    return matrix[:m], low[:m], high[:m], marks, y, lower, inverse, shares, hard, zmp
+
+
+@njit(cache=True)
+def unfold(u, tables, numbers, matrix, low, high, y, lower, inverse, yaws, hard, zmp):
+    """The plan that a point u stands for: jerks, feet; greatest violations: hard, ZMP, clearance; a clearance is active."""
+    count, feet = tables.inverse.shape[0], inverse.shape[0]
+    jerks, steps = np.zeros((2, count)), np.zeros((feet, 3))
+    for axis in range(2):
+        w = u[axis * (count + feet) : (axis + 1) * (count + feet)] - y[axis]
+        for k in range(feet):
+            for j in range(k, feet):
+                steps[k, axis] += inverse[j, k] * w[count + j]
+        for j in range(count):
+            for k in range(feet):
+                w[j] -= lower[k, j] * steps[k, axis]
+        for j in range(count):
+            for i in range(j + 1):
+                jerks[axis, j] += tables.inverse[i, j] * w[i]
+    turned = 0.0
+    for k in range(feet):
+        turned += u[2 * (count + feet) + k] / numbers.yaw
+        steps[k, 2] = yaws[k + 1] + turned
+    worst = np.zeros(3)
+    active = False
+    for i in range(matrix.shape[0]):
+        value = 0.0
+        for j in range(u.shape[0]):
+            value += matrix[i, j] * u[j]
+        kind = 0 if i < hard else (1 if i < zmp else 2)
+        worst[kind] = max(worst[kind], low[i] - value, value - high[i])
+        if kind == 2 and value - low[i] < 1e-6:
+            active = True
+    finite = np.isfinite(jerks).all() and np.isfinite(steps).all()
+    return jerks, steps, worst, active, finite
