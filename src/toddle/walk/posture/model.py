@@ -63,11 +63,11 @@ class PostureModel:
     skeleton: Skeleton
     damping: float = 1e-6
     pull: float = 1e-7
-    tolerance: tuple[float, float] = (1e-4, 1e-3)
+    tolerance: tuple[float, float] = (5e-4, 2e-3)
 
 
 def posture_model(
-    humanoid: Humanoid, *, damping: float = 1e-6, pull: float = 1e-7, tolerance: tuple[float, float] = (1e-4, 1e-3)
+    humanoid: Humanoid, *, damping: float = 1e-6, pull: float = 1e-7, tolerance: tuple[float, float] = (5e-4, 2e-3)
 ) -> PostureModel:
     """Prepare a humanoid, once.
 

@@ -36,12 +36,13 @@ def logarithm(rotation, target, out):
         for i in range(1, 3):
             if r[i, i] > r[k, k]:
                 k = i
-        length = 0.0
+        length, along = 0.0, 0.0
         for i in range(3):
             r[i, k] += 1.0 if i == k else 0.0
             length += r[i, k] * r[i, k]
+            along += r[i, k] * out[i]
         for i in range(3):
-            out[i] = angle * r[i, k] / np.sqrt(length)
+            out[i] = (angle if along >= 0.0 else -angle) * r[i, k] / np.sqrt(length)
 
 
 @njit(cache=True, error_model="numpy")
