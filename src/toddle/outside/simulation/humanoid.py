@@ -18,7 +18,7 @@ from toddle.failures import BadInput
 from toddle.outside.simulation.disturbances import TICK, TIMESTEP, WorldOptions
 from toddle.outside.simulation.senses import organs, sense, site
 from toddle.outside.simulation.touching import clearances, shapes, touching
-from toddle.outside.simulation.world import build
+from toddle.outside.simulation.world import build, disturb_masses
 from toddle.robots.humanoid import Humanoid
 from toddle.signals import Senses
 
@@ -101,7 +101,8 @@ class HumanoidSimulation:
             )
         self.data = mujoco.MjData(self.model)
         self._organs = organs(humanoid, self.model, self.options)
-        self._shapes = shapes(humanoid, self.model, len(self.options.circles))
+        disturb_masses(self.model, self.options)
+        self._shapes = shapes(self.model, len(self.options.circles))
         self._chest = int(self.model.site_bodyid[site(humanoid, self.model, "chest")])
         self._soles = [site(humanoid, self.model, name) for name in ("left_sole", "right_sole")]
         self._root = int(self.model.body_rootid[self._chest])

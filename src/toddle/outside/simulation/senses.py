@@ -1,7 +1,7 @@
 """The senses of a simulated humanoid: which numbers of MuJoCo they are, and what they have of noise, bias and age.
 
-A force-torque sensor sits above the sole and feels the foot's own weight too. As on the real robot that weight is
-known and taken off, for a foot that is level; what a foot's acceleration adds stays. Forces and the inertial unit's
+A force-torque sensor also feels what hangs under it. As on the real robot that weight is known and taken off, for a
+foot that is level; what its acceleration adds stays. Forces and the inertial unit's
 rates are means over a tick, as a sensor that measures faster than it reports gives them: the servos' targets change
 once a tick, and a force that is looked at always at the same moment after it shows only that moment.
 """
@@ -18,7 +18,7 @@ from jaxtyping import Float, Int
 
 from toddle.failures import BadInput
 from toddle.outside.simulation.disturbances import Noise, WorldOptions
-from toddle.outside.simulation.world import GRAVITY, upright
+from toddle.outside.simulation.world import GRAVITY, SOLES, upright
 from toddle.robots.humanoid import Humanoid
 from toddle.signals import Senses
 
@@ -36,7 +36,7 @@ class Organs(NamedTuple):
         orientation: of the inertial unit's quaternion in ``sensordata``.
         waist: number of the site.
         sign: of those 18 numbers: MuJoCo tells what a foot does to the leg, not what the floor does to the foot.
-        tare: what is added to them: the weight of the feet.
+        tare: what is added to them: the weight under the sensors.
         sigma: standard deviation of the noise of the row, then of orientation (3), x, y and heading.
         bias: constant error of the same.
         upright: rotation from the floor's frame to the vertical's.
@@ -69,7 +69,7 @@ def organs(humanoid: Humanoid, model: mujoco.MjModel, options: WorldOptions) -> 
         _place(humanoid, model, "orientation"),
         site(humanoid, model, "waist"),
         np.array([-1.0] * 12 + [1.0] * 6),
-        _tare(humanoid),
+        _tare(humanoid, model),
         _deviations(options.noise, joints),
         bias,
         upright(options),
@@ -136,15 +136,18 @@ def _place(humanoid: Humanoid, model: mujoco.MjModel, name: str) -> int:
     return int(model.sensor_adr[number])
 
 
-def _tare(humanoid: Humanoid) -> Float[np.ndarray, "18"]:
-    """The weight of each foot on a level floor, by the masses that the description gives."""
+def _tare(humanoid: Humanoid, model: mujoco.MjModel) -> Float[np.ndarray, "18"]:
+    """The weight that hangs under each sensor on a level floor, by the masses that the description gives."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
     tare = np.zeros(18)
-    for side, sole in enumerate(humanoid.soles):
-        mass = humanoid.tree.mass[sole.body]
-        centre = sole.rotation.T @ (humanoid.tree.centre[sole.body] - sole.position)
-        weight = np.array([0.0, 0.0, mass * GRAVITY])
-        tare[6 * side : 6 * side + 3] = weight
-        tare[6 * side + 3 : 6 * side + 6] = np.cross(centre, weight)
+    for side, name in enumerate(SOLES):
+        number = site(humanoid, model, name)
+        body = int(model.site_bodyid[number])
+        away = data.subtree_com[body] - data.site_xpos[number]
+        centre = data.site_xmat[number].reshape(3, 3).T @ away
+        weight = np.array([0.0, 0.0, model.body_subtreemass[body] * GRAVITY])
+        tare[6 * side : 6 * side + 6] = *weight, *np.cross(centre, weight)
     return tare
 
 

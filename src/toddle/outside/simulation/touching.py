@@ -9,7 +9,6 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from toddle.outside.simulation.world import OBSTACLE, SOLES
-from toddle.robots.humanoid import Humanoid
 
 FEET, LEGS, BODY = 0, 1, 2
 _NONE = -1
@@ -20,9 +19,9 @@ class Shapes(NamedTuple):
     """What each of MuJoCo's geoms is.
 
     Attributes:
-        part: of each geom: 0 a foot, 1 a leg, 2 the body, -1 none of the robot.
+        part: of each geom: 0 a foot, 1 a leg, 2 the body, -1 nothing of the robot that can touch.
         obstacle: whether each geom is one.
-        robot: geoms of the robot.
+        robot: geoms of the robot that can touch.
         obstacles: geoms of the obstacles.
     """
 
@@ -32,15 +31,17 @@ class Shapes(NamedTuple):
     obstacles: tuple[int, ...]
 
 
-def shapes(humanoid: Humanoid, model: mujoco.MjModel, obstacles: int) -> Shapes:
-    """Sorts a model's geoms: a foot is all that moves with a sole, a leg what is between it and the waist's body."""
-    feet = {int(model.site_bodyid[model.site(name).id]) for name in SOLES}
-    trunk = set(_upwards(model, int(model.site_bodyid[model.site("waist").id])))
+def shapes(model: mujoco.MjModel, obstacles: int) -> Shapes:
+    """Sorts a model's geoms: a foot is all that is rigid with a sole, a leg what is between it and the waist."""
+    rigid = model.body_weldid
+    feet = {int(rigid[model.site_bodyid[model.site(name).id]]) for name in SOLES}
+    trunk = set(_upwards(model, int(rigid[model.site_bodyid[model.site("waist").id]])))
     legs = {body for foot in feet for body in _upwards(model, foot)} - feet - trunk
     part = np.full(model.ngeom, _NONE)
-    for geom, body in enumerate(model.geom_bodyid.tolist()):
-        if model.body_weldid[body] != 0:
-            part[geom] = FEET if body in feet else LEGS if body in legs else BODY
+    solid = (model.geom_contype | model.geom_conaffinity) != 0
+    for geom in np.flatnonzero(solid & (rigid[model.geom_bodyid] != 0)).tolist():
+        body = int(rigid[model.geom_bodyid[geom]])
+        part[geom] = FEET if body in feet else LEGS if body in legs else BODY
     obstacle = np.zeros(model.ngeom, bool)
     obstacle[[model.geom(OBSTACLE.format(number)).id for number in range(obstacles)]] = True
     robot = tuple(np.flatnonzero(part != _NONE).tolist())
@@ -77,5 +78,5 @@ def _upwards(model: mujoco.MjModel, body: int) -> list[int]:
     chain: list[int] = []
     while body:
         chain.append(body)
-        body = int(model.body_parentid[body])
+        body = int(model.body_weldid[model.body_parentid[body]])
     return chain

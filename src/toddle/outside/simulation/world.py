@@ -1,7 +1,7 @@
 """The world around a humanoid, told to MuJoCo: floor, bumps, obstacles, light, and the errors of its masses.
 
-Who collides with whom: the soles with the floor, the bumps, the obstacles and each other; every other shape of the
-robot with the obstacles only.
+Who collides with whom is said by two bits, as in `toddle.robots.humanoids.physics`: floor and bumps carry the soles,
+an obstacle stops soles and shells.
 """
 
 from __future__ import annotations
@@ -39,23 +39,28 @@ def build(humanoid: Humanoid, options: WorldOptions) -> mujoco.MjModel:
     for name in SOLES:
         if spec.geom(name) is None:
             raise BadInput(f"there is no geom {name}", where=humanoid.name, remedy="give each foot a box sole")
-    draw = np.random.default_rng([options.seed, 0])
     spec.option.timestep = TIMESTEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = gravity(options)
     # A simulation that breaks must stay broken and be seen, not silently start again from zero.
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    for geom in spec.geoms:
-        sole = geom.name in SOLES
-        geom.contype, geom.conaffinity = (_GROUND, _GROUND | _OBSTACLE) if sole else (0, _OBSTACLE)
     _scenery(spec)
     _floor(spec, options)
-    _bumps(spec, options, draw)
+    _bumps(spec, options, np.random.default_rng([options.seed, 0]))
     _obstacles(spec, options)
     _slow_servos(spec, options)
-    model = spec.compile()
-    _missing_weights(model, options, draw)
-    return model
+    return spec.compile()
+
+
+def disturb_masses(model: mujoco.MjModel, options: WorldOptions) -> None:
+    """Makes every body heavier or lighter than it was said to be, inertia included; the model changes in place."""
+    if options.mass_error == 0:
+        return
+    draw = np.random.default_rng([options.seed, 3])
+    scale = draw.uniform(1 - options.mass_error, 1 + options.mass_error, model.nbody)
+    model.body_mass[:] *= scale
+    model.body_inertia[:] *= scale[:, None]
+    mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
 def gravity(options: WorldOptions) -> Float[np.ndarray, "3"]:
@@ -113,8 +118,8 @@ def _obstacles(spec: Any, options: WorldOptions) -> None:
             name=OBSTACLE.format(number),
             type=mujoco.mjtGeom.mjGEOM_CYLINDER,
             size=[circle.radius, _TALL / 2, 0.0],
-            contype=_OBSTACLE,
-            conaffinity=_OBSTACLE,
+            contype=_GROUND | _OBSTACLE,
+            conaffinity=0,
             rgba=[0.80, 0.36, 0.28, 1.0],
         )
 
@@ -128,16 +133,6 @@ def _slow_servos(spec: Any, options: WorldOptions) -> None:
         servo.dynprm[0] = options.lag_s
         servo.actdim = 1
         servo.actearly = True
-
-
-def _missing_weights(model: mujoco.MjModel, options: WorldOptions, draw: np.random.Generator) -> None:
-    """Every body heavier or lighter than it was said to be, inertia included."""
-    if options.mass_error == 0:
-        return
-    scale = draw.uniform(1 - options.mass_error, 1 + options.mass_error, model.nbody)
-    model.body_mass[:] *= scale
-    model.body_inertia[:] *= scale[:, None]
-    mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
 def _scenery(spec: Any) -> None:
