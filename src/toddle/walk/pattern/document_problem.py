@@ -25,11 +25,11 @@ from toddle.walk.pattern.time_stepping import TimeStepping, time_stepping
 FROZEN = 3
 """Fewer samples than this before the end of a step, the next footstep is that of the last iteration."""
 
-_STAY = 1e-5
+_STAY = 1e-4
 """Weight that holds a footstep without cost near its last value, in parts of beta: of all optima the nearest."""
 
 _EQUALITY = 5
-_SETTINGS = {"primal_tol": 1e-9, "dual_tol": 1e-12, "eps_prox": 0.0, "iter_limit": 2000}
+_SETTINGS = {"primal_tol": 1e-9, "dual_tol": 1e-12, "sing_tol": 1e-14, "eps_prox": 0.0, "iter_limit": 2000}
 
 
 class Programme(NamedTuple):

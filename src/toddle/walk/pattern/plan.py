@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import StrEnum
-from typing import NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -55,6 +55,7 @@ class Interval(NamedTuple):
     milliseconds: float
 
 
+@runtime_checkable
 class Pattern(Protocol[State]):
     """A form of the walking pattern. The state is returned, never kept."""
 

@@ -1,4 +1,4 @@
-"""The sole in the air: 4th order in height, 5th order along and across and in yaw (Huber 2019, equations 2.89 to 2.110).
+"""The sole in the air: 4th order in height, 5th order along, across and in yaw (Huber 2019, equations 2.89 to 2.110).
 
 A quintic starts from where the sole is, how fast it moves and how it accelerates, so that it may be fitted anew at
 every tick: that is the document's feedback. Compiled, since the robot's loop asks at every tick.

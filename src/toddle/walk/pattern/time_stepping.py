@@ -76,6 +76,11 @@ def advance(state: Float[np.ndarray, "*axes 3"], jerk: Float[np.ndarray, "*axes"
     return state @ motion + jerk[..., None] * np.array([t**3 / 6, t * t / 2, t])
 
 
-def zero_moment_point(state: Float[np.ndarray, "*axes 3"], height: float) -> Float[np.ndarray, "*axes"]:
-    """Where the linear inverted pendulum presses on the floor [m] (2.6, 2.7)."""
+def zero_moment_point(state: Float[np.ndarray, "*axes axis 3"], height: float) -> Float[np.ndarray, "*axes axis"]:
+    """Where the linear inverted pendulum presses on the floor [m] (2.6, 2.7).
+
+    Args:
+        state: position, velocity, acceleration of each axis.
+        height: of the centre of mass [m].
+    """
     return state[..., 0] - height / GRAVITY * state[..., 2]

@@ -1,9 +1,9 @@
 """The walking pattern without a body: intervals of a plan become rows of a trajectory (Huber 2019, section 2.1.3).
 
-The centre of mass follows by linear time-stepping at the command period (2.29). A sole swings from the end of the double
-support that opens a step; along, across and yaw are fitted anew at every iteration from where the sole is then. As in
-the author's program it arrives 5 % of the single support early and waits, still coming down. Unlike there it lifts
-off when the double support ends: that program, by a rounding, one sample later, with a jump in height.
+The centre of mass follows by linear time-stepping at the command period (2.29). A sole swings from the end of the
+double support that opens a step; along, across and yaw are fitted anew at every iteration from where the sole is then.
+As in the author's program it arrives 5 % of the single support early and waits, still coming down. Unlike there it
+lifts off when the double support ends: that program, by a rounding, one sample later, with a jump in height.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Trajectory:
     intervals: tuple[Interval, ...]
 
     def columns(self) -> dict[str, np.ndarray]:
-        """By name, in the order of a table: t, com_x, ..., com_x_velocity, ..., zmp_x, zmp_y, left_x, ..., right_yaw."""
+        """By name, in a table's order: t, com_x, ..., com_x_velocity, ..., zmp_x, zmp_y, left_x, ..., right_yaw."""
         table = {"t": self.t}
         for order, suffix in enumerate(("", "_velocity", "_acceleration")):
             table |= {f"com_{axis}{suffix}": self.com[:, order, i] for i, axis in enumerate(_AXES)}
