@@ -84,13 +84,14 @@ class Moment(NamedTuple):
 def selection(count, feet, sample, phase, remaining, first, later, step_time, halt):
     """Shares of the ZMP's reference: origin, the foot that stands, the feet to come; one row each sample.
 
-    l_k rises from 0 to 1 over the double support that begins when foot k lands (k = 0: began with this step).
-    After the landing ``halt`` (negative: never) the weight stays half-way.
+    l_k rises from 0 to 1 over the double support that begins when foot k lands (k = 0: began with this step; only the
+    last part of a longer one counts). After the landing ``halt`` (negative: never) the weight stays half-way.
     """
     shares = np.zeros((count, feet + 2))
+    waits = max(first - later, 0.0)
     for i in range(count):
         t = (i + 1) * sample
-        over = min(1.0, (phase + t) / max(first, 1e-9))
+        over = min(max((phase + t - waits) / max(first - waits, 1e-9), 0.0), 1.0)
         if halt == 0:
             over *= 0.5
         shares[i, 0] = 1.0 - over
@@ -110,7 +111,7 @@ def selection(count, feet, sample, phase, remaining, first, later, step_time, ha
 @njit(cache=True)
 def corner(tables, numbers, shares, halt):
     """L_F and the inverse of C: what the feet add to the factor of one axis's Hessian."""
-    count, feet = shares.shape[0], shares.shape[1] - 2
+    feet = shares.shape[1] - 2
     v = np.ascontiguousarray(shares[:, 2:])
     lower = -numbers.beta * (v.T @ tables.w_zmp)
     h = numbers.beta * (v.T @ v) - lower @ lower.T
@@ -236,8 +237,11 @@ def foot_rows(matrix, low, high, tables, numbers, moment, inverse, yaws, last, p
 
 
 @njit(cache=True)
-def zmp_rows(matrix, low, high, m, tables, numbers, shares, base, drift, error, yaws):
-    """The zero moment point stays in the shrunk sole around its reference (2.65 to 2.69), turned by the yaws' mean."""
+def zmp_rows(matrix, low, high, m, tables, numbers, moment, shares, base, drift, error, yaws):
+    """The zero moment point stays in the shrunk sole around its reference (2.65 to 2.69), turned by the yaws' mean.
+
+    Before a first step the weight is anywhere between the feet, which stand side by side.
+    """
     count, feet = shares.shape[0], shares.shape[1] - 2
     for i in range(count):
         yaw = (shares[i, 0] + shares[i, 1]) * yaws[0]
@@ -251,8 +255,11 @@ def zmp_rows(matrix, low, high, m, tables, numbers, shares, base, drift, error, 
             for k in range(feet):
                 add_yaw(matrix[m], numbers, count, feet, k, shares[i, k + 2] * slope)
             known = x * drift[i, 0] + y * drift[i, 1]
-            low[m] = (numbers.rear if axis == 0 else -numbers.side) - known
-            high[m] = (numbers.front if axis == 0 else numbers.side) - known
+            wider = 0.0
+            if moment.phase + (i + 1) * numbers.sample < moment.double_support - numbers.double_support + 1e-9:
+                wider = 0.5 * abs(x * moment.swing_x + y * moment.swing_y)
+            low[m] = (numbers.rear if axis == 0 else -numbers.side) - known - wider
+            high[m] = (numbers.front if axis == 0 else numbers.side) - known + wider
             m += 1
     return m
 
@@ -393,7 +400,7 @@ def assemble(tables, numbers, moment, com, steps, yaws, last, jerks, circles, pi
     matrix = np.zeros((most, wide))
     low, high = np.empty(most), np.full(most, 1e30)
     hard = foot_rows(matrix, low, high, tables, numbers, moment, inverse, yaws, last, pinned)
-    zmp = zmp_rows(matrix, low, high, hard, tables, numbers, shares, base, drift, error, yaws)
+    zmp = zmp_rows(matrix, low, high, hard, tables, numbers, moment, shares, base, drift, error, yaws)
     m = zmp
     if circles.shape[0] > 0:
         m = foot_clearance(matrix, low, m, numbers, moment, inverse, yaws, last, circles)
@@ -412,7 +419,7 @@ def assemble(tables, numbers, moment, com, steps, yaws, last, jerks, circles, pi
 
 @njit(cache=True)
 def unfold(u, tables, numbers, matrix, low, high, y, lower, inverse, yaws, hard, zmp):
-    """The plan that a point u stands for: jerks, feet; greatest violations: hard, ZMP, clearance; a clearance is active."""
+    """The plan that a point u stands for: jerks, feet; greatest violations (hard, ZMP, clearance); clearance active."""
     count, feet = tables.inverse.shape[0], inverse.shape[0]
     jerks, steps = np.zeros((2, count)), np.zeros((feet, 3))
     for axis in range(2):
