@@ -60,11 +60,12 @@ class Step(NamedTuple):
 
 
 class Landing(NamedTuple):
-    """A touchdown: when [s], which side, where."""
+    """A touchdown: when [s], which side, where, and the velocity that was asked for in the step that it ends."""
 
     t: float
     side: int
     pose: Pose
+    asked: Velocity
 
 
 class WalkerState(NamedTuple):

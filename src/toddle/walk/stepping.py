@@ -123,21 +123,17 @@ def side_by_side(gait: Gait, a: Pose, b: Pose) -> bool:
     return abs(dx) < _SAME_PLACE and abs(abs(dy) - gait.foot_distance) < _SAME_PLACE and abs(turned) < _SAME_YAW
 
 
-def corrected(
-    correction: Velocity, asked: Velocity, landings: tuple[Landing, ...], gait: Gait, config: WalkConfig
-) -> Velocity:
-    """The integral on the velocity achieved over the last two steps."""
+def corrected(correction: Velocity, landings: tuple[Landing, ...], config: WalkConfig) -> Velocity:
+    """The integral on the velocity achieved over the last two steps, against what was asked for in them."""
     if len(landings) < 3 or not config.correct_velocity:
         return correction
-    got = achieved(landings)
-    errors = [a - b for a, b in zip(asked, got, strict=True)]
-    if max(abs(errors[0]), abs(errors[1])) > 0.3 or abs(errors[2]) > 0.6:
-        return correction
+    asked = zip(landings[-2].asked, landings[-1].asked, strict=True)
     most = (config.velocity_most[0], config.velocity_most[0], config.velocity_most[1])
+    errors = [(a + b) / 2 - got for (a, b), got in zip(asked, achieved(landings), strict=True)]
     return Velocity(
         *(
-            min(max(old + config.velocity_gain * error, -m), m)
-            for old, error, m in zip(correction, errors, most, strict=True)
+            min(max(old + config.velocity_gain * error, -limit), limit)
+            for old, error, limit in zip(correction, errors, most, strict=True)
         )
     )
 

@@ -163,23 +163,27 @@ class Walker:
         anchors = state.anchors.copy()
         anchors[landed] = sensed.soles[landed]
         anchors[landed, 2] = 0.0
+        carried = state.step.foot[2]
+        anchors[landed, 3] = carried + math.remainder(anchors[landed, 3] - carried, 2 * math.pi)
         pose = _pose(anchors, landed)
-        landings = (*state.landings[-2:], Landing(state.t, landed, pose))
+        landings = (*state.landings[-2:], Landing(state.t, landed, pose, velocity))
         correction = state.correction
         if moving(velocity) and not state.step.moved:
-            correction = corrected(correction, velocity, landings, self.gait, self.config)
+            correction = corrected(correction, landings, self.config)
         state = state._replace(anchors=anchors, landings=landings, correction=correction)
         if not moving(velocity) and side_by_side(self.gait, state.step.foot, pose):
             return state._replace(mode=Mode.STAND, correction=STILL)
         return self._begin(state, landed, state.step.foot[:2], velocity)
 
     def _plan(self, state: WalkerState, wanted: Velocity, circles: tuple[Circle, ...]) -> tuple[WalkerState, Chain]:
-        """The previewed footsteps: from the predictive controller, or from the command alone."""
+        """The previewed footsteps: the landing under way stays as it was when its step began, the others follow."""
         step = state.step
-        final = not moving(wanted)
-        steps = by_command(self.gait, wanted, step.stance, step.foot[2])
-        state = state._replace(step=step._replace(final=final, turn=wanted.omega * self.gait.step_time))
-        return state, chain(self.gait, steps, final)
+        if state.mode == Mode.SHIFT:
+            steps = by_command(self.gait, wanted, step.stance, step.foot[2])
+            return state, chain(self.gait, steps, final=False)
+        yaw = step.foot[2] + step.turn
+        later = by_command(self.gait, wanted, 1 - step.stance, yaw)
+        return state, chain(self.gait, (rotate(step.foot[2], step.nominal), *later[:-1]), step.final)
 
     def _adjusted(self, state: WalkerState, sensed: Estimate, ahead: Chain) -> tuple[WalkerState, Pair, Pair]:
         """Place and time of the landing, the planned zero moment point, and the DCM that goes with them."""
@@ -218,9 +222,7 @@ class Walker:
             limits = limits._replace(least=goal.displacement, most=goal.displacement)
         chosen = adjust(self.config.step, self.gait.omega, x0, step.phase, step.end, goal, limits)
         far = math.hypot(chosen.displacement[0] - goal.displacement[0], chosen.displacement[1] - goal.displacement[1])
-        return step._replace(
-            landing=chosen.displacement, end=chosen.end, nominal=goal.displacement, moved=step.moved or far > _FAR
-        )
+        return step._replace(landing=chosen.displacement, end=chosen.end, moved=step.moved or far > _FAR)
 
     def _feedback(self, state: WalkerState, sensed: Estimate, zmp: Pair, dcm: Pair) -> Pair:
         """p = p_ref + K (xi - xi_ref), within the soles that stand."""
@@ -233,7 +235,7 @@ class Walker:
         inside = zmp if state.mode == Mode.STEP else (float(middle[0]), float(middle[1]))
         return support.clip(self.area(state, 1.0), inside, wanted)
 
-    def area(self, state: WalkerState, share: float) -> support.Corners:
+    def area(self, state: WalkerState, share: float = 1.0) -> support.Corners:
         """The area of the soles that stand, counter-clockwise."""
         if state.mode == Mode.STEP and state.step.phase >= state.step.double_support:
             return support.sole_corners(self.gait, *state.step.foot, share)

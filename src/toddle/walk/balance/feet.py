@@ -18,7 +18,7 @@ _LOWERING = 0.08  # a foot that should have landed goes on down so fast [m/s]
 _LOWEST = -0.03  # and stops there, where there is no floor [m]
 _SETTLE = 0.04  # time constant by which a landed foot's reference comes to the floor [s]
 _LEAST_TIME = 0.02  # [s]
-_PRESS = 0.003  # the landing's height: a little into the floor, so that contact comes in time [m]
+_PRESS = -0.002  # height
 _PLANAR, _HEIGHT = [0, 1, 3], [2]
 
 
