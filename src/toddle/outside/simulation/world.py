@@ -36,6 +36,8 @@ def build(humanoid: Humanoid, options: WorldOptions) -> mujoco.MjModel:
         BadInput: the description lacks something that a humanoid's must have.
     """
     spec = humanoid.spec.copy()
+    if spec.joint("floating_base") is None:
+        raise BadInput("there is no joint floating_base", where=humanoid.name, remedy="give it a free joint")
     for name in SOLES:
         if spec.geom(name) is None:
             raise BadInput(f"there is no geom {name}", where=humanoid.name, remedy="give each foot a box sole")
@@ -151,25 +153,31 @@ def _scenery(spec: Any) -> None:
         type=mujoco.mjtTexture.mjTEXTURE_2D,
         builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
         mark=mujoco.mjtMark.mjMARK_EDGE,
-        rgb1=[0.86, 0.87, 0.88],
-        rgb2=[0.78, 0.80, 0.82],
-        markrgb=[0.70, 0.72, 0.74],
+        rgb1=[0.84, 0.86, 0.88],
+        rgb2=[0.75, 0.78, 0.81],
+        markrgb=[0.66, 0.69, 0.73],
         width=256,
         height=256,
     )
     material = spec.add_material(name="floor", texrepeat=[1.0, 1.0], texuniform=True)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
-    _ = spec.worldbody.add_light(
+    for light in list(spec.lights):
+        spec.delete(light)
+    # the sun goes with the robot: it casts shadows only around itself
+    _ = spec.joint("floating_base").parent.add_light(
         name="sun",
         type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        pos=[0.0, 0.0, 4.0],
+        mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACK,
+        pos=[1.0, -1.3, 2.4],
         dir=[-0.35, 0.45, -0.82],
-        diffuse=[0.55, 0.54, 0.52],
-        specular=[0.15, 0.15, 0.15],
+        diffuse=[0.62, 0.61, 0.58],
+        specular=[0.10, 0.10, 0.10],
         castshadow=True,
     )
     look = spec.visual
-    look.headlight.ambient, look.headlight.diffuse = [0.38, 0.38, 0.40], [0.30, 0.30, 0.30]
+    look.headlight.ambient, look.headlight.diffuse = [0.34, 0.34, 0.37], [0.20, 0.20, 0.20]
     look.headlight.specular = [0.05, 0.05, 0.05]
-    look.quality.shadowsize = 4096
+    spec.stat.extent = 2.0
+    look.map.zfar, look.map.shadowclip = 30.0, 1.5
+    look.quality.shadowsize, look.quality.offsamples = 2048, 2
     look.global_.offwidth, look.global_.offheight = 1920, 1080
