@@ -26,7 +26,7 @@ from toddle.robots.humanoid import LEFT
 from toddle.signals import Footstep, Velocity
 from toddle.walk.pattern.displacement import Pair, displacements
 from toddle.walk.pattern.feasible import landing_hull
-from toddle.walk.pattern.nmpc_kernels import Moment, Numbers, Tables, assemble, unfold
+from toddle.walk.pattern.nmpc_kernels import Moment, Numbers, Tables, assemble, shift, unfold
 from toddle.walk.pattern.obstacles import NONE, near
 from toddle.walk.pattern.plan import Status
 from toddle.walk.pattern.quadratic import least_distance
@@ -232,37 +232,41 @@ def _solve(
     known: bool,
 ) -> Plan:
     """Linearised at ``guess``; which is the answer where there is no better one."""
-    problem_numbers, foot = problem.numbers, state.support
+    numbers, foot = problem.numbers, state.support
     yaws = turned(problem, foot.yaw, velocity)
     drawn = drawn_to(problem, state, velocity)
-    com = np.array(state.com)
-    com[0, 0] -= foot.x
-    com[1, 0] -= foot.y
-    feet = guess.feet - np.array([foot.x, foot.y, 0.0])
-    wide = problem.gait.steps * problem_numbers.reach + problem_numbers.body + 0.5
+    place = np.array([foot.x, foot.y, 0.0])
+    com = state.com.copy()
+    com[:, 0] -= place[:2]
+    wide = problem.gait.steps * numbers.reach + numbers.body + 0.5
     around = near(circles, foot.x, foot.y, wide) if len(circles) else NONE
     pinned = known and 0 < state.remaining <= problem.freeze and state.halt != 0
     tables, moment = problem.tables, _moment(state, velocity)
     matrix, low, high, marks, y, lower, inverse, shares, hard, zmp = assemble(
-        tables, problem_numbers, moment, com, drawn, yaws, feet, guess.jerks, around, pinned
+        tables, numbers, moment, com, drawn, yaws, guess.feet - place, guess.jerks, around, pinned
     )
     answer = least_distance(matrix, low, high, marks, None if deadline_ms is None else deadline_ms / 1e3)
     if answer.status != Status.SOLVED:
         return guess._replace(status=answer.status)
-    jerks, steps, worst, active, finite = unfold(
-        answer.u, tables, problem_numbers, matrix, low, high, y, lower, inverse, yaws, hard, zmp
+    jerks, feet, displacement, reference, figures = unfold(
+        answer.u, tables, numbers, moment, matrix, low, high, y, lower, inverse, shares, yaws, hard, zmp, place
     )
-    if not finite or worst[0] > _BROKEN:
-        return guess._replace(status=Status.NOT_FINITE if not finite else Status.INFEASIBLE)
-    displacement = np.diff(steps[:, :2], axis=0, prepend=0.0)
-    steps[:, 0] += foot.x
-    steps[:, 1] += foot.y
-    reference = shares[:, 2:] @ steps[:, :2] + shares[:, :1] * np.array(state.origin)
-    reference += shares[:, 1:2] * np.array([foot.x, foot.y])
+    broken, violation, overlap, active = figures.tolist()
+    if not broken <= _BROKEN:
+        return guess._replace(status=Status.INFEASIBLE if math.isfinite(broken) else Status.NOT_FINITE)
     return Plan(
-        steps, displacement, jerks[:, 0].copy(), jerks, reference, Status.SOLVED, 0.0, bool(active), float(worst[1]),
-        float(worst[2]), state,
-    )  # fmt: skip
+        feet,
+        displacement,
+        jerks[:, 0],
+        jerks,
+        reference,
+        Status.SOLVED,
+        0.0,
+        active > 0,
+        violation,
+        overlap,
+        state,
+    )
 
 
 def turned(problem: Nmpc, yaw: float, velocity: Velocity) -> Float[np.ndarray, " soles"]:
@@ -296,23 +300,23 @@ def shifted(problem: Nmpc, last: Plan, state: PlanState, velocity: Velocity) -> 
     elapsed = before.remaining + state.phase if switched else state.phase - before.phase
     if not math.isfinite(elapsed):
         return last
-    count = problem.gait.preview
-    late = min(max(round(elapsed / problem.gait.sample), 0), count)
-    jerks, zmp, feet, drawn = last.jerks, last.zmp, last.feet, last.displacement
-    if late:
-        jerks = np.concatenate([jerks[:, late:], np.zeros((2, late))], axis=1)
-        zmp = np.concatenate([zmp[late:], np.repeat(zmp[-1:], late, axis=0)])
+    gait = problem.gait
+    late = min(max(round(elapsed / gait.sample), 0), gait.preview)
+    step, turn = np.zeros(2), 0.0
     if switched:
         speed = velocity if all(map(math.isfinite, velocity)) else STILL
-        side = (before.support.side + len(feet)) % 2
-        end = Footstep(side, *feet[-1])
-        gait = problem.gait
-        step = displacements(gait.foot_distance, gait.step_time, speed, end.side, end.yaw, 1)[0]
-        turn = turned(problem, end.yaw, speed)[1]
-        feet = np.concatenate([feet[1:], [[end.x + step[0], end.y + step[1], turn]]])
-        drawn = np.concatenate([drawn[1:], [step]])
+        side, yaw = (before.support.side + len(last.feet)) % 2, float(last.feet[-1, 2])
+        step = np.array(displacements(gait.foot_distance, gait.step_time, speed, side, yaw, 1)[0])
+        turn = float(turned(problem, yaw, speed)[1])
+    jerks, zmp, feet, moved = shift(last.jerks, last.zmp, last.feet, last.displacement, late, switched, step, turn)
     return last._replace(
-        feet=feet, displacement=drawn, jerk=jerks[:, 0].copy(), jerks=jerks, zmp=zmp, state=_usable(state)
+        feet=feet,
+        displacement=moved,
+        jerk=jerks[:, 0],
+        jerks=jerks,
+        zmp=zmp,
+        status=Status.SOLVED,
+        state=_usable(state),
     )
 
 

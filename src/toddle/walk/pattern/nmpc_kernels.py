@@ -109,28 +109,47 @@ def selection(count, feet, sample, phase, remaining, first, later, step_time, ha
 
 
 @njit(cache=True)
+def inverse_root(h):
+    """The inverse of the lower Cholesky factor of a small matrix, of which the lower triangle is given."""
+    n = h.shape[0]
+    c, inverse = np.zeros((n, n)), np.zeros((n, n))
+    for j in range(n):
+        for i in range(j, n):
+            total = h[i, j]
+            for k in range(j):
+                total -= c[i, k] * c[j, k]
+            c[i, j] = math.sqrt(max(total, 1e-300)) if i == j else total / c[j, j]
+    for j in range(n):
+        for i in range(j, n):
+            total = 1.0 if i == j else 0.0
+            for k in range(j, i):
+                total -= c[i, k] * inverse[k, j]
+            inverse[i, j] = total / c[i, i]
+    return inverse
+
+
+@njit(cache=True)
 def corner(tables, numbers, shares, halt):
     """L_F and the inverse of C: what the feet add to the factor of one axis's Hessian."""
-    feet = shares.shape[1] - 2
-    v = np.ascontiguousarray(shares[:, 2:])
-    lower = -numbers.beta * (v.T @ tables.w_zmp)
-    h = numbers.beta * (v.T @ v) - lower @ lower.T
+    count, feet = shares.shape[0], shares.shape[1] - 2
+    lower, h = np.zeros((feet, count)), np.zeros((feet, feet))
     for k in range(feet):
+        for i in range(count):
+            share = shares[i, k + 2]
+            if share > 0.0:
+                for j in range(i + 1):
+                    lower[k, j] -= numbers.beta * share * tables.w_zmp[i, j]
+                for j in range(k + 1):
+                    h[k, j] += numbers.beta * share * shares[i, j + 2]
         weight = numbers.still if k + 1 == halt else numbers.delta
         h[k, k] += weight + numbers.last
         if k > 0:
             h[k - 1, k - 1] += weight
             h[k, k - 1] -= weight
-            h[k - 1, k] -= weight
-    inverse = np.zeros((feet, feet))
-    c = np.linalg.cholesky(h)
-    for j in range(feet):
-        for i in range(j, feet):
-            total = 1.0 if i == j else 0.0
-            for k in range(j, i):
-                total -= c[i, k] * inverse[k, j]
-            inverse[i, j] = total / c[i, i]
-    return lower, inverse
+        for j in range(k + 1):
+            for i in range(count):
+                h[k, j] -= lower[k, i] * lower[j, i]
+    return lower, inverse_root(h)
 
 
 @njit(cache=True)
@@ -418,34 +437,67 @@ def assemble(tables, numbers, moment, com, steps, yaws, last, jerks, circles, pi
 
 
 @njit(cache=True)
-def unfold(u, tables, numbers, matrix, low, high, y, lower, inverse, yaws, hard, zmp):
-    """The plan that a point u stands for: jerks, feet; greatest violations (hard, ZMP, clearance); clearance active."""
+def unfold(u, tables, numbers, moment, matrix, low, high, y, lower, inverse, shares, yaws, hard, zmp, place):
+    """The plan that a point u stands for, moved to the foot's ``place``.
+
+    Jerks; feet (x, y, yaw) and their displacements; the ZMP's reference; and four numbers: greatest violation of the
+    hard, the ZMP and the clearance rows, and 1 where a clearance row is active. Not finite: the first is infinite.
+    """
     count, feet = tables.inverse.shape[0], inverse.shape[0]
-    jerks, steps = np.zeros((2, count)), np.zeros((feet, 3))
+    jerks, steps, moved = np.zeros((2, count)), np.zeros((feet, 3)), np.zeros((feet, 2))
+    reference = np.empty((count, 2))
     for axis in range(2):
         w = u[axis * (count + feet) : (axis + 1) * (count + feet)] - y[axis]
         for k in range(feet):
             for j in range(k, feet):
                 steps[k, axis] += inverse[j, k] * w[count + j]
+            moved[k, axis] = steps[k, axis] - (steps[k - 1, axis] if k > 0 else 0.0)
         for j in range(count):
             for k in range(feet):
                 w[j] -= lower[k, j] * steps[k, axis]
         for j in range(count):
             for i in range(j + 1):
                 jerks[axis, j] += tables.inverse[i, j] * w[i]
+        origin = moment.origin_x if axis == 0 else moment.origin_y
+        for i in range(count):
+            reference[i, axis] = place[axis] + shares[i, 0] * origin
+            for k in range(feet):
+                reference[i, axis] += shares[i, k + 2] * steps[k, axis]
+        for k in range(feet):
+            steps[k, axis] += place[axis]
     turned = 0.0
     for k in range(feet):
         turned += u[2 * (count + feet) + k] / numbers.yaw
         steps[k, 2] = yaws[k + 1] + turned
-    worst = np.zeros(3)
-    active = False
+    figures = np.zeros(4)
     for i in range(matrix.shape[0]):
         value = 0.0
         for j in range(u.shape[0]):
             value += matrix[i, j] * u[j]
         kind = 0 if i < hard else (1 if i < zmp else 2)
-        worst[kind] = max(worst[kind], low[i] - value, value - high[i])
+        figures[kind] = max(figures[kind], low[i] - value, value - high[i])
         if kind == 2 and value - low[i] < 1e-6:
-            active = True
-    finite = np.isfinite(jerks).all() and np.isfinite(steps).all()
-    return jerks, steps, worst, active, finite
+            figures[3] = 1.0
+    if not (np.isfinite(jerks).all() and np.isfinite(steps).all()):
+        figures[0] = np.inf
+    return jerks, steps, moved, reference, figures
+
+
+@njit(cache=True)
+def shift(jerks, zmp, steps, moved, late, landed, step, turn):
+    """A plan seen ``late`` samples on; where its first foot has ``landed``, one more is added at the end."""
+    count, feet = jerks.shape[1], steps.shape[0]
+    new_jerks, new_zmp = np.zeros((2, count)), np.empty((count, 2))
+    new_steps, new_moved = steps.copy(), moved.copy()
+    for i in range(count):
+        if i + late < count:
+            new_jerks[:, i] = jerks[:, i + late]
+        new_zmp[i] = zmp[min(i + late, count - 1)]
+    if landed:
+        for k in range(feet - 1):
+            new_steps[k] = steps[k + 1]
+            new_moved[k] = moved[k + 1]
+        new_moved[feet - 1] = step
+        new_steps[feet - 1, :2] = steps[feet - 1, :2] + step
+        new_steps[feet - 1, 2] = turn
+    return new_jerks, new_zmp, new_steps, new_moved
