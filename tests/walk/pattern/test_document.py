@@ -15,6 +15,7 @@ from toddle.robots.gait import Gait
 from toddle.signals import Circle, Velocity
 from toddle.walk.pattern.document import Document, DocumentState
 from toddle.walk.pattern.plan import Interval, Status
+from toddle.walk.pattern.time_stepping import zero_moment_point
 from toddle.walk.pattern.trajectory import walk_pattern
 
 SEVEN = replace(HRP2, preview=14, step_time=0.7)
@@ -137,3 +138,31 @@ def test_no_answer_is_told_and_never_used() -> None:
 def test_a_gait_that_it_cannot_walk_is_refused(change: dict[str, object], key: str) -> None:
     with pytest.raises(BadInput, match=key):
         Document(replace(HRP2, **change))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("gait", [HRP2, HEICUB], ids=["hrp2", "heicub"])
+def test_whatever_comes_an_answer_keeps_its_constraints_or_is_none(gait: Gait) -> None:
+    """Commands beyond reach, kicks, twisted soles, circles underfoot; judged by the ZMP and hull, not by the solver."""
+    rng, pattern, told = np.random.default_rng(11), Document(gait), set()
+    half = np.array([gait.foot_length, gait.foot_width]) / 2 - gait.margin
+    for _ in range(12):
+        circles = [
+            Circle(rng.uniform(-2, 2), rng.uniform(-2, 2), rng.uniform(0.05, 0.4)) for _ in range(rng.integers(0, 4))
+        ]
+        state = pattern.start()
+        for _ in range(30):
+            kick = rng.normal(size=(2, 1)) * [0.0, 0.2 * (rng.random() < 0.05), 0.0]
+            twist = rng.normal(size=(2, 3)) * (rng.random() < 0.03) * [0.02, 0.1, 0.0]
+            state = state._replace(com=state.com + kick, yaw=state.yaw + twist)
+            vx, vy, omega = rng.uniform(-1, 1, 3) * [0.4, 0.2, 0.5]
+            command = Velocity(vx, vy, omega)
+            before, (state, interval) = state, pattern.step(state, command, circles)
+            told.add(interval.status)
+            assert np.isfinite(state.com).all()
+            if interval.status is Status.SOLVED and before.left > 1:
+                c, s = np.cos(before.support.yaw), np.sin(before.support.yaw)
+                offset = zero_moment_point(state.com, gait.com_height) - [before.support.x, before.support.y]
+                assert np.all(np.abs([[c, s], [-s, c]] @ offset) < half + 1e-5)
+            if abs(state.com).max() > 100:
+                break
+    assert told == {Status.SOLVED, Status.INFEASIBLE}

@@ -28,6 +28,9 @@ FROZEN = 3
 _STAY = 1e-4
 """Weight that holds a footstep without cost near its last value, in parts of beta: of all optima the nearest."""
 
+_VIOLATION = 1e-6
+"""Of a row, above which an answer is none [m, rad, rad/s]."""
+
 _EQUALITY = 5
 _SETTINGS = {"primal_tol": 1e-9, "dual_tol": 1e-12, "sing_tol": 1e-14, "eps_prox": 0.0, "iter_limit": 2000}
 
@@ -206,7 +209,7 @@ def yaw_jerks(
 
 
 def solve(programme: Programme) -> np.ndarray | None:
-    """The optimum by DAQP; None: there is none."""
+    """The optimum by DAQP; None: there is none, or it was not found."""
     sense = np.zeros(len(programme.upper), np.int32)
     if programme.equality:
         sense[-programme.equality :] = _EQUALITY
@@ -219,7 +222,15 @@ def solve(programme: Programme) -> np.ndarray | None:
         sense,
         **_SETTINGS,
     )
-    return np.asarray(x) if flag == 1 else None
+    x = np.asarray(x)
+    return x if flag == 1 and _violation(programme, x) <= _VIOLATION else None
+
+
+def _violation(programme: Programme, x: np.ndarray) -> float:
+    """By how much the worst bound or row is broken; the solver's own tolerance is of scaled rows."""
+    values = programme.rows @ x
+    values = np.concatenate([x[: len(programme.upper) - len(values)], values])
+    return float(np.maximum(values - programme.upper, programme.lower - values).max())
 
 
 def _preview(gait: Gait, matrices: TimeStepping, per_step: int, left: int) -> Preview:
