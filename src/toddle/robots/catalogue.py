@@ -12,6 +12,8 @@ from toddle.failures import BadInput, MissingExtra, unknown_name
 
 if TYPE_CHECKING:
     from toddle.robots.body import Body
+    from toddle.robots.gait import Gait
+    from toddle.robots.humanoids.settings import Settings
 
 MODELS = Path(__file__).parent / "models"
 
@@ -274,3 +276,70 @@ _ROBOTS = (
 )
 
 CATALOGUE: Mapping[str, Robot] = {robot.name: robot for robot in _ROBOTS}
+
+
+@dataclass(frozen=True)
+class HumanoidRecord:
+    """What the catalogue says of one humanoid.
+
+    Attributes:
+        name: how it is called on the command line.
+        about: one line for the listing.
+        source: the document or package its numbers come from.
+        build: where its description lies and what is said of it; None: it has a gait and no body.
+    """
+
+    name: str
+    about: str
+    source: str
+    build: Callable[[], tuple[Path, Settings]] | None = None
+
+    @property
+    def gait(self) -> Gait | None:
+        """How it walks by default; None: that is inferred when its body is loaded."""
+        from toddle.robots.humanoids import gaits
+
+        return gaits.DEFAULT.get(self.name)
+
+    @property
+    def document_gait(self) -> Gait | None:
+        """How it walks in Huber 2019; None: it does not occur there."""
+        from toddle.robots.humanoids import gaits
+
+        return gaits.DOCUMENT.get(self.name)
+
+
+def _heicub() -> tuple[Path, Settings]:
+    from toddle.robots.humanoids import icub
+
+    return icub.heicub()
+
+
+def _icub() -> tuple[Path, Settings]:
+    from toddle.robots.humanoids import icub
+
+    return icub.icub()
+
+
+def _talos() -> tuple[Path, Settings]:
+    from toddle.robots.humanoids import others
+
+    return others.talos()
+
+
+def _g1() -> tuple[Path, Settings]:
+    from toddle.robots.humanoids import others
+
+    return others.g1()
+
+
+_HUMANOIDS = (
+    HumanoidRecord("heicub", "iCub without arms and head: 15 joints, 26 kg", "icub-models; Huber 2019", _heicub),
+    HumanoidRecord("icub", "the whole iCub: 32 joints, 33 kg", "icub-models", _icub),
+    HumanoidRecord("talos", "TALOS: 90 kg (extra: humanoids)", "example-robot-data", _talos),
+    HumanoidRecord("g1", "Unitree G1: 33 kg (extra: humanoids)", "example-robot-data", _g1),
+    HumanoidRecord("hrp2", "HRP-2: the pattern's numbers alone, no body", "Huber 2019"),
+)
+
+HUMANOIDS: Mapping[str, HumanoidRecord] = {humanoid.name: humanoid for humanoid in _HUMANOIDS}
+"""The humanoids that toddle knows by name."""

@@ -4,23 +4,27 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from toddle.failures import unknown_name
 from toddle.robots.humanoid import Humanoid
+
+__all__ = ["load_humanoid"]
 
 
 def load_humanoid(spec: str, config: Path | None = None) -> Humanoid:
     """The humanoid that a name or a file stands for.
 
     Args:
-        spec: a name of the catalogue's ``HUMANOIDS``.
-        config: a configuration file (TOML).
+        spec: a name of the catalogue's ``HUMANOIDS``; the path of a URDF or MJCF file; or that of a configuration
+            file (.toml) which names one with its key ``model``.
+        config: a configuration file (TOML, the keys of `toddle.robots.humanoids.settings.Settings`); what it says
+            goes before what is known of a named robot.
 
     Raises:
-        BadInput: there is no such humanoid, or it can't be used.
+        BadInput: there is no such humanoid, or it can't be used; the line names file, key and remedy.
     """
-    from toddle.robots.humanoids import icub
+    from toddle.robots.humanoids import config as configuration
+    from toddle.robots.humanoids.description import read
+    from toddle.robots.humanoids.infer import humanoid
 
-    known = {"heicub": icub.heicub, "icub": icub.icub}
-    if spec not in known:
-        raise unknown_name("humanoid", spec, known)
-    return known[spec]()
+    path, settings = configuration.found(spec, config)
+    where = str(path) if config is None else f"{config} on {path.name}"
+    return humanoid(read(path, settings.base, settings.without), settings, where)

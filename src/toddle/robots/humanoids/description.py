@@ -1,150 +1,96 @@
-"""URDF and MJCF files of humanoids, through MuJoCo's own parsers, as a `Skeleton`.
-
-MuJoCo welds the root link of a URDF to the world and drops its mass without a word, so a world link and a floating
-joint are put above it; fixed links are kept apart (``fusestatic``) so that every frame keeps its name; mesh paths
-(``package://``) are made absolute; meshes that MuJoCo can't read (.dae) become their vertices' convex hull.
-"""
+"""URDF and MJCF files of humanoids, through MuJoCo's own parsers, as a `Skeleton`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import deepcopy
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
-from xml.etree.ElementTree import Element, SubElement
 
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from toddle.failures import BadInput
+from toddle.failures import BadInput, unknown_name
 from toddle.robots.humanoids.skeleton import Hinge, Link, Pose, Shape, Skeleton
+from toddle.robots.humanoids.urdf import LEAST_MASS, ready
 from toddle.robots.markup import parse, read_bytes
 
-_LEAST_MASS, _LEAST_INERTIA = 1e-9, 1e-12  # lets MuJoCo compile frames that weigh nothing; zeroed again [kg, kg m^2]
-_READ_BY_MUJOCO = (".stl", ".obj", ".msh")
 
-
-def read(path: Path, without: Sequence[str] = ()) -> Skeleton:
+def read(path: Path, base: str | None = None, without: Sequence[str] = ()) -> Skeleton:
     """The whole robot of a URDF or MJCF file.
 
     Args:
         path: the file.
-        without: links of a URDF that are left out, with all that hangs on them.
+        base: link that floats; what is above it is left out. None: the one that does, or the root.
+        without: links that are left out, with all that hangs on them.
 
     Raises:
         BadInput: the file can't be used; the line says which element and what mends it.
     """
     root = parse(read_bytes(path), str(path))
     if root.tag == "robot":
-        return _skeleton(_compiled(_urdf(root, path, without), path), path)
+        told = ready(root, path, base, without)
+        skeleton = _skeleton(_compiled(mujoco.MjSpec.from_string, told.text, path), None, path)
+        return tuple(
+            replace(
+                link,
+                shapes=(*link.shapes, *told.clouds.get(link.name, ())),
+                weightless=link.name in told.weightless,
+            )
+            for link in skeleton
+        )
     if root.tag == "mujoco":
-        return _skeleton(_compiled(mujoco.MjSpec.from_file(str(path)), path), path)
+        skeleton = _skeleton(_compiled(mujoco.MjSpec.from_file, str(path), path), base, path)
+        known = [link.name for link in skeleton]
+        for name in without:
+            if name not in known:
+                raise unknown_name("body", name, known, where=f"{path}: without")
+        return _pruned(skeleton, without)
     raise BadInput(f"its root element is <{root.tag}>", where=str(path), remedy="name a URDF or MJCF file")
 
 
-def _urdf(root: Element, path: Path, without: Sequence[str]) -> Any:
-    robot = Element("robot", name=root.get("name") or path.stem)
-    kept = _kept(root, without)
-    _compiler(robot)
-    parents = {joint.find("child").get("link") for joint in root.findall("joint")}  # type: ignore[union-attr]
-    for link in root.findall("link"):
-        if link.get("name") in kept:
-            robot.append(_ready(link, path))
-    for joint in root.findall("joint"):
-        if joint.find("child").get("link") in kept:  # type: ignore[union-attr]
-            robot.append(joint)
-    base = next(link.get("name") for link in root.findall("link") if link.get("name") not in parents)
-    SubElement(robot, "link", name="world")
-    floating = SubElement(robot, "joint", name="floating_base", type="floating")
-    SubElement(floating, "parent", link="world")
-    SubElement(floating, "child", link=str(base))
-    return mujoco.MjSpec.from_string(ElementTree.tostring(robot, encoding="unicode"))
-
-
-def _compiler(robot: Element) -> None:
-    extension = SubElement(robot, "mujoco")
-    SubElement(
-        extension,
-        "compiler",
-        fusestatic="false",
-        discardvisual="false",
-        strippath="false",
-        boundmass=str(_LEAST_MASS),
-        boundinertia=str(_LEAST_INERTIA),
-        balanceinertia="true",
-    )
-
-
-def _kept(root: Element, without: Sequence[str]) -> set[str]:
-    child = {j.find("child").get("link"): j.find("parent").get("link") for j in root.findall("joint")}  # type: ignore[union-attr]
-    kept = set()
-    for link in root.findall("link"):
-        name: str | None = link.get("name")
-        above = name
-        while above is not None and above not in without:
-            above = child.get(above)
-        if above is None and name:
-            kept.add(name)
-    return kept
-
-
-def _ready(link: Element, path: Path) -> Element:
-    link = deepcopy(link)
-    shown = {mesh.get("filename") for mesh in link.findall("visual/geometry/mesh")}
-    for shape in [*link.findall("visual"), *link.findall("collision")]:
-        mesh = shape.find("geometry/mesh")
-        if mesh is None:
-            continue
-        if shape.tag == "collision" and mesh.get("filename") in shown:
-            link.remove(shape)
-            continue
-        found = _mesh_path(mesh.get("filename", ""), path)
-        if found is None:
-            raise BadInput(
-                f"the mesh {mesh.get('filename')!r} is missing",
-                where=f"{path}: link {link.get('name')!r}",
-                remedy="put the file there, or remove the element that names it",
-            )
-        if found.suffix.lower() not in _READ_BY_MUJOCO:
-            link.remove(shape)
-            continue
-        mesh.set("filename", str(found))
-    return link
-
-
-def _mesh_path(name: str, path: Path) -> Path | None:
-    """Where a mesh lies: ``package://`` is looked for in the folders above the file, the nearest first."""
-    _, package, rest = name.rpartition("://")
-    if not package:
-        found = path.parent / rest
-        return found.resolve() if found.is_file() else None
-    short = rest.partition("/")[2]
-    for folder in path.resolve().parents:
-        for found in (folder / rest, folder / short):
-            if found.is_file():
-                return found
-    found = Path("/" + rest.lstrip("/"))
-    return found if found.is_file() else None
-
-
-def _compiled(spec: Any, path: Path) -> Any:
-    for mesh in spec.meshes:
-        mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
-    for geom in spec.geoms:
-        geom.contype, geom.conaffinity = geom.contype and 1, geom.conaffinity and 1
+def _compiled(parser: Any, source: str, path: Path) -> Any:
     try:
-        return spec.compile()
+        spec = parser(source)
+        for mesh in spec.meshes:
+            mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+        model = spec.compile()
     except ValueError as error:
         raise BadInput(f"MuJoCo can't read it: {error}", where=str(path), remedy="mend that element") from None
+    loops = (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD)
+    if any(kind in loops for kind in model.eq_type):
+        raise BadInput(
+            "its chains are closed by <equality> constraints",
+            where=str(path),
+            remedy="remove the <connect> and <weld> elements: only open chains are walked with",
+        )
+    return model
 
 
-def _skeleton(model: Any, path: Path) -> Skeleton:
-    root = _root(model)
-    order = [i for i in range(1, model.nbody) if model.body_rootid[i] == model.body_rootid[root] and i >= root]
-    index = {body: place for place, body in enumerate(order)}
-    return tuple(_link(model, body, index.get(int(model.body_parentid[body]), -1)) for body in order)
+def _pruned(skeleton: Skeleton, without: Sequence[str]) -> Skeleton:
+    """Without some links and all that hangs on them."""
+    place: dict[int, int] = {-1: -1}
+    kept: list[Link] = []
+    for index, link in enumerate(skeleton):
+        if link.name not in without and link.parent in place:
+            place[index] = len(kept)
+            kept.append(replace(link, parent=place[link.parent]))
+    return tuple(kept)
+
+
+def _skeleton(model: Any, base: str | None, path: Path) -> Skeleton:
+    names = [model.body(body).name for body in range(model.nbody)]
+    if base is not None and base not in names[1:]:
+        raise unknown_name("body", base, [name for name in names[1:] if name], where=f"{path}: base")
+    if model.nbody < 2:
+        raise BadInput("it has no body", where=str(path), remedy="name the description of a robot")
+    root = _root(model) if base is None else names.index(base)
+    index = {root: 0}
+    for body in range(root + 1, model.nbody):
+        if int(model.body_parentid[body]) in index:
+            index[body] = len(index)
+    return tuple(_link(model, body, index.get(int(model.body_parentid[body]), -1)) for body in index)
 
 
 def _root(model: Any) -> int:
@@ -158,7 +104,7 @@ def _root(model: Any) -> int:
 
 def _link(model: Any, body: int, parent: int) -> Link:
     rotation = matrix(model.body_iquat[body])
-    light = model.body_mass[body] <= 2 * _LEAST_MASS
+    light = model.body_mass[body] <= 2 * LEAST_MASS
     return Link(
         name=model.body(body).name or f"body{body}",
         parent=parent,
@@ -170,6 +116,18 @@ def _link(model: Any, body: int, parent: int) -> Link:
         hinges=_hinges(model, body),
         shapes=_shapes(model, body),
         frames=_sites(model, body),
+        others=_others(model, body),
+    )
+
+
+def _others(model: Any, body: int) -> tuple[str, ...]:
+    """Names of the body's joints that are no hinges, but for what makes it float."""
+    first = int(model.body_jntadr[body])
+    kinds = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_BALL
+    return tuple(
+        model.joint(joint).name or f"joint{joint}"
+        for joint in range(first, first + int(model.body_jntnum[body]))
+        if model.jnt_type[joint] in kinds
     )
 
 

@@ -125,13 +125,11 @@ def _show(spec: Any, body: Any, shape: Shape, name: str) -> None:
         group=2 if not shape.solid else 3,
         mass=0.0,
     )
-    if shape.vertices is not None and shape.faces is not None:
-        spec.add_mesh(
-            name=name,
-            uservert=shape.vertices.ravel(),
-            userface=shape.faces.ravel(),
-            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
-        )
+    if shape.vertices is not None:
+        shell = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+        mesh = spec.add_mesh(name=name, uservert=shape.vertices.ravel(), inertia=shell)
+        if shape.faces is not None:
+            mesh.userface = shape.faces.ravel()
         geom.meshname = name
 
 

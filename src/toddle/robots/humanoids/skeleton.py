@@ -6,7 +6,7 @@ welded to their parents: masses add up, inertias by the parallel axis theorem, a
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -53,7 +53,9 @@ class Shape:
 class Link:
     """A rigid body: pose in its parent with the hinges at zero, mass [kg], its centre and inertia about it.
 
-    The inertia [kg m^2] has the axes of the link. ``frames`` are other names for places on it: welded links, sites.
+    The inertia [kg m^2] has the axes of the link. ``frames`` are names of places on it: itself, welded links, sites.
+    ``others`` are joints that are no hinges, which are held; ``weightless`` says that the description gives a link
+    with geometry no mass.
     """
 
     name: str
@@ -66,6 +68,8 @@ class Link:
     hinges: tuple[Hinge, ...] = ()
     shapes: tuple[Shape, ...] = ()
     frames: Mapping[str, Pose] = field(default_factory=dict)
+    others: tuple[str, ...] = ()
+    weightless: bool = False
 
 
 Skeleton = tuple[Link, ...]
@@ -76,36 +80,67 @@ def moved(shape: Shape, position: Float[np.ndarray, "3"], rotation: Float[np.nda
     return replace(shape, position=position + rotation @ shape.position, rotation=rotation @ shape.rotation)
 
 
-def weld(skeleton: Skeleton, keep: Sequence[str], drop: Sequence[str] = ()) -> Skeleton:
+def weld(skeleton: Skeleton, keep: Collection[str]) -> Skeleton:
     """The skeleton with only some hinges, at zero where they are gone.
+
+    A link that weighs nothing and carries one other is no body of its own: its hinge turns the one it carries.
 
     Args:
         skeleton: all of it.
         keep: names of the hinges that stay.
-        drop: names of links that are left out with all that hangs on them.
     """
     links: list[Link] = []
-    place: dict[int, tuple[int, Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]] = {}
-    gone: set[int] = set()
-    kept = set(keep)
-    for index, link in enumerate(skeleton):
-        if link.name in drop or link.parent in gone:
-            gone.add(index)
-            continue
-        hinges = tuple(hinge for hinge in link.hinges if hinge.name in kept)
-        if index == 0:
-            host, position, rotation = -1, link.position, link.rotation
-        else:
-            host, at, turn = place[link.parent]
-            position, rotation = at + turn @ link.position, turn @ link.rotation
-        if index == 0 or hinges:
-            place[index] = (len(links), np.zeros(3), np.eye(3))
+    place: list[tuple[int, Pose]] = []
+    for link in skeleton:
+        hinges = tuple(hinge for hinge in link.hinges if hinge.name in keep)
+        host, (at, turn) = place[link.parent] if link.parent >= 0 else (-1, (np.zeros(3), np.eye(3)))
+        position, rotation = at + turn @ link.position, turn @ link.rotation
+        if link.parent < 0 or hinges:
+            place.append((len(links), (np.zeros(3), np.eye(3))))
             own = {link.name: (np.zeros(3), np.eye(3)), **link.frames}
             links.append(replace(link, parent=host, position=position, rotation=rotation, hinges=hinges, frames=own))
         else:
-            place[index] = (host, position, rotation)
+            place.append((host, (position, rotation)))
             links[host] = _joined(links[host], link, position, rotation)
-    return tuple(links)
+    return _without_virtual(tuple(links))
+
+
+def _without_virtual(links: Skeleton) -> Skeleton:
+    """Hinges of links that weigh nothing and carry one other, told of the other."""
+    children = [sum(link.parent == number for link in links) for number in range(len(links))]
+    virtual = {
+        number
+        for number, link in enumerate(links)
+        if number > 0 and children[number] == 1 and link.mass == 0 and not link.shapes
+    }
+    kept: list[Link] = []
+    place = {-1: -1}
+    for number, link in enumerate(links):
+        found = link
+        while found.parent in virtual:
+            found = _carried(links[found.parent], found)
+        if number not in virtual:
+            place[number] = len(kept)
+            kept.append(replace(found, parent=place[found.parent]))
+    return tuple(kept)
+
+
+def _carried(carrier: Link, link: Link) -> Link:
+    """The link with its carrier's hinges before its own, on the carrier's parent."""
+    back = link.rotation.T
+    hinges = tuple(
+        replace(hinge, axis=back @ hinge.axis, anchor=back @ (hinge.anchor - link.position)) for hinge in carrier.hinges
+    )
+    frames = {name: (back @ (at - link.position), back @ turn) for name, (at, turn) in carrier.frames.items()}
+    return replace(
+        link,
+        parent=carrier.parent,
+        position=carrier.position + carrier.rotation @ link.position,
+        rotation=carrier.rotation @ link.rotation,
+        hinges=(*hinges, *link.hinges),
+        frames={**frames, **link.frames},
+        others=(*carrier.others, *link.others),
+    )
 
 
 def _joined(host: Link, part: Link, position: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"]) -> Link:
@@ -124,6 +159,7 @@ def _joined(host: Link, part: Link, position: Float[np.ndarray, "3"], rotation: 
         inertia=inertia,
         shapes=(*host.shapes, *(moved(shape, position, rotation) for shape in part.shapes)),
         frames={**host.frames, **frames},
+        others=(*host.others, *part.others),
     )
 
 
