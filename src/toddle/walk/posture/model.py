@@ -61,13 +61,13 @@ class PostureModel:
 
     joints: tuple[str, ...]
     skeleton: Skeleton
-    damping: float = 1e-6
-    pull: float = 1e-7
+    damping: float = 2e-7
+    pull: float = 2e-8
     tolerance: tuple[float, float] = (5e-4, 2e-3)
 
 
 def posture_model(
-    humanoid: Humanoid, *, damping: float = 1e-6, pull: float = 1e-7, tolerance: tuple[float, float] = (5e-4, 2e-3)
+    humanoid: Humanoid, *, damping: float = 2e-7, pull: float = 2e-8, tolerance: tuple[float, float] = (5e-4, 2e-3)
 ) -> PostureModel:
     """Prepare a humanoid, once.
 

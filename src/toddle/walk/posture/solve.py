@@ -32,12 +32,14 @@ TASKS = (
 POSITIONS = (0, 1, 3)
 """Those of the tasks that are positions [m]; the others are rotations [rad]."""
 
-WEIGHTS = np.repeat([1.0, 10.0, 10.0, 10.0, 10.0, 0.1, 0.1], 3)
-"""The soles come first, then the centre of mass, then the trunk [cost/m^2], [cost/rad^2]."""
+WEIGHTS = np.concatenate(([1.0, 1.0, 0.1], np.repeat([10.0, 0.1], (12, 6))))
+"""The soles first, then where the centre of mass is over them, then its height and the trunk [cost/m^2, cost/rad^2].
+
+Where an ankle stops at its limit, the height gives: a walk bears a low centre of mass better than one out of place."""
 WEIGHTS.flags.writeable = False
 
 FLAT = 1e-5
-"""A slope of the cost under which nothing nearer is in sight."""
+"""A slope of the cost that counts as none [cost/rad]."""
 _TARGET_SIZE = 66
 
 
@@ -68,8 +70,8 @@ class Posture(NamedTuple):
     Attributes:
         q: base position [m], its quaternion (w, x, y, z), joints within their limits [rad].
         misses: the distance of each of `TASKS` from its target [m, rad], released rows left out.
-        verdict: reached; at a joint limit or out of reach, which are the nearest posture; or not converged: more
-            iterations come nearer.
+        verdict: reached; at a joint limit, which the tasks press against; out of reach: no posture is nearer; or not
+            converged: more iterations come nearer.
         at_limit: which joints that move are at a limit.
         iterations: steps made.
     """
@@ -98,15 +100,17 @@ def solve_posture(
     goal = np.concatenate(target, axis=None, dtype=float)
     if goal.size != _TARGET_SIZE:
         raise BadInput(f"a target of {goal.size} numbers", where="posture", remedy=f"it has {_TARGET_SIZE}")
-    q, misses, met, steepest, limited, steps = descend(
+    q, misses, met, steepest, blocked, limited, steps = descend(
         model.skeleton, checked(model, q), goal, model.damping, model.pull, *model.tolerance, iterations
     )
     if met:
         verdict = Verdict.REACHED
-    elif not (steepest < FLAT and np.isfinite(misses).all()):
+    elif not np.isfinite(misses).all():
         verdict = Verdict.NOT_CONVERGED
+    elif blocked > FLAT:
+        verdict = Verdict.AT_JOINT_LIMIT
     else:
-        verdict = Verdict.AT_JOINT_LIMIT if limited.any() else Verdict.OUT_OF_REACH
+        verdict = Verdict.OUT_OF_REACH if steepest < FLAT else Verdict.NOT_CONVERGED
     return Posture(q, misses, verdict, limited, steps)
 
 
