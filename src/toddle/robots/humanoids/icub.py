@@ -37,7 +37,7 @@ def heicub() -> tuple[Path, Settings]:
 
 def icub() -> tuple[Path, Settings]:
     """The whole iCub, whose head and arms raise its centre of mass; walking moves its legs and torso."""
-    return _file(), replace(_SAID, name="icub", com_height=0.535)
+    return _file(), replace(_SAID, name="icub", com_height=0.525)
 
 
 def _file() -> Path:
