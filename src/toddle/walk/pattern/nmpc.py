@@ -25,7 +25,7 @@ from toddle.robots.gait import Gait
 from toddle.robots.humanoid import LEFT
 from toddle.signals import Footstep, Velocity
 from toddle.walk.pattern.displacement import Pair, displacements
-from toddle.walk.pattern.feasible import landing_hull
+from toddle.walk.pattern.feasible import landing_hull, widening
 from toddle.walk.pattern.nmpc_kernels import Moment, Numbers, Tables, assemble, shift, unfold
 from toddle.walk.pattern.obstacles import NONE, near
 from toddle.walk.pattern.plan import Status
@@ -161,12 +161,22 @@ def nmpc(gait: Gait, weights: Weights | None = None, *, freeze: float = 0.06, bo
     )
     upper = np.linalg.cholesky(hessian[::-1, ::-1])[::-1, ::-1]
     inverse = np.ascontiguousarray(np.linalg.inv(upper))
-    moved = [np.ascontiguousarray(u @ inverse.T) for u in (step.position_jerk, step.velocity_jerk, step.zmp_jerk)]
+    position, speed, zmp = (
+        np.ascontiguousarray(u @ inverse.T) for u in (step.position_jerk, step.velocity_jerk, step.zmp_jerk)
+    )
     hull = landing_hull(gait)
     tables = Tables(
-        step.position_state, step.velocity_state, step.zmp_state, step.zmp_jerk, step.position_jerk, *moved, inverse,
+        step.position_state,
+        step.velocity_state,
+        step.zmp_state,
+        step.zmp_jerk,
+        step.position_jerk,
+        position,
+        speed,
+        zmp,
+        inverse,
         hull.rows,
-    )  # fmt: skip
+    )
     front, rear = (gait.foot_ahead + way * (gait.foot_length / 2 - gait.margin[0]) for way in (1, -1))
     numbers = Numbers(
         alpha=weights.alpha,
@@ -279,7 +289,12 @@ def turned(problem: Nmpc, yaw: float, velocity: Velocity) -> Float[np.ndarray, "
 def drawn_to(problem: Nmpc, state: PlanState, velocity: Velocity) -> Float[np.ndarray, "steps 2"]:
     """Displacements by the command, each from the foot before [m]."""
     gait, foot = problem.gait, state.support
-    return np.array(displacements(gait.foot_distance, gait.step_time, velocity, foot.side, foot.yaw, gait.steps))
+    return np.array(displacements(_apart(gait, velocity), gait.step_time, velocity, foot.side, foot.yaw, gait.steps))
+
+
+def _apart(gait: Gait, velocity: Velocity) -> float:
+    """The foot distance, widened where the hull asks for it [m]."""
+    return gait.foot_distance + (widening(velocity, gait) or 0.0)
 
 
 def nominal(problem: Nmpc, state: PlanState, velocity: Velocity) -> Plan:
@@ -306,7 +321,7 @@ def shifted(problem: Nmpc, last: Plan, state: PlanState, velocity: Velocity) -> 
     if switched:
         speed = velocity if all(map(math.isfinite, velocity)) else STILL
         side, yaw = (before.support.side + len(last.feet)) % 2, float(last.feet[-1, 2])
-        step = np.array(displacements(gait.foot_distance, gait.step_time, speed, side, yaw, 1)[0])
+        step = np.array(displacements(_apart(gait, speed), gait.step_time, speed, side, yaw, 1)[0])
         turn = float(turned(problem, yaw, speed)[1])
     jerks, zmp, feet, moved = shift(last.jerks, last.zmp, last.feet, last.displacement, late, switched, step, turn)
     return last._replace(
@@ -352,15 +367,15 @@ def _usable(state: PlanState) -> PlanState:
     if all(map(math.isfinite, numbers)):
         return state
 
-    def usable(number: float) -> float:
-        return number if math.isfinite(number) else 0.0
-
+    x, y, yaw, x2, y2, yaw2, *origin, phase, remaining, over = (n if math.isfinite(n) else 0.0 for n in numbers[:11])
     return PlanState(
         np.nan_to_num(state.com, nan=0.0, posinf=0.0, neginf=0.0),
-        Footstep(state.support.side, *map(usable, state.support[1:])),
-        Footstep(state.lifted.side, *map(usable, state.lifted[1:])),
-        (usable(state.origin[0]), usable(state.origin[1])),
-        *map(usable, state[4:7]),
+        Footstep(state.support.side, x, y, yaw),
+        Footstep(state.lifted.side, x2, y2, yaw2),
+        (origin[0], origin[1]),
+        phase,
+        remaining,
+        over,
         state.halt,
     )
 

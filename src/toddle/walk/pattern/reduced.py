@@ -14,6 +14,7 @@ import numpy as np
 from toddle.robots.gait import Gait
 from toddle.robots.humanoid import LEFT, RIGHT
 from toddle.signals import Circle, Footstep, Velocity
+from toddle.walk.pattern.feasible import cap
 from toddle.walk.pattern.nmpc import NEVER, Nmpc, Plan, PlanState, Weights, nmpc, plan
 from toddle.walk.pattern.obstacles import circles
 from toddle.walk.pattern.plan import Interval, com_at_start, standing
@@ -73,7 +74,8 @@ class Reduced:
     def step(
         self, state: ReducedState, velocity: Velocity, obstacles: Sequence[Circle] = ()
     ) -> tuple[ReducedState, Interval]:
-        """One iteration; it lasts a sample, or what is left of the step."""
+        """One iteration; it lasts a sample, or what is left of the step. The command is capped to what fits."""
+        velocity = cap(velocity, self.gait)
         at, shift = self._commanded(state, velocity)
         found = plan(self.problem, at, velocity, circles(obstacles), state.plan, self.deadline_ms)
         stands = at.halt == 0
