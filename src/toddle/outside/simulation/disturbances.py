@@ -15,7 +15,7 @@ TICK = 0.01
 """Control period: what one `tick` of the simulation lasts [s]."""
 
 
-def _within(name: str, value: float, low: float, high: float) -> None:
+def _within(name: str, value: float | int, low: float | int, high: float | int) -> None:
     if not (math.isfinite(value) and low <= value <= high):
         bounds = f"from {low:g} to {high:g}" if math.isfinite(high) else f"of at least {low:g}"
         remedy = f"give a number {bounds}" if math.isfinite(low) else "give a finite number"

@@ -207,21 +207,21 @@ class HumanoidSimulation:
 
     def _steps(self) -> tuple[float, Float[np.ndarray, " positions"], Float[np.ndarray, " speeds"]]:
         """One tick of physics; the start of its last step, to which MuJoCo's sensors then belong."""
-        self._vectors[:] = 0.0
-        self._contact[:] = 0.0
+        for total in (self._vectors, self._contact, self._about):
+            total[:] = 0.0
         for _ in range(_STEPS - 1):
             self._step()
         t, q, v = float(self.data.time), self.data.qpos.copy(), self.data.qvel.copy()
-        self._about[:] = self.data.subtree_com[self._root]
         self._step()
-        self._vectors /= _STEPS
-        self._contact /= _STEPS
+        for total in (self._vectors, self._contact, self._about):
+            total /= _STEPS
         return t, q, v
 
     def _step(self) -> None:
         mujoco.mj_step(self.model, self.data)
         self._vectors += self.data.sensordata
         self._contact += self.data.cfrc_ext[self._feet]
+        self._about += self.data.subtree_com[self._root]
 
     def _press(self) -> None:
         """The mean force of all pushes over this tick, so that each one's impulse is exact."""
