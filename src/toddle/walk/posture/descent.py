@@ -88,11 +88,11 @@ def missed(target, errors, metres, radians, out):
 
 @njit(cache=True, error_model="numpy")
 def descend(skeleton, start, target, damping, pull, metres, radians, iterations):
-    """Up to ``iterations`` steps from ``start``; fewer when a step is shorter than 1e-8 or none lowers the cost.
+    """Up to ``iterations`` steps; fewer when one is shorter than 1e-8 or gains less than 1e-10 of the cost.
 
     Args:
         skeleton: the robot.
-        start: configuration; joints that move and are beyond their limits are first set to them.
+        start: configuration to start from; joints that move and are beyond their limits are first set to them.
         target: as told in `toddle.walk.posture.tasks`.
         damping: the least one.
         pull: weight of the distance from home.
@@ -134,12 +134,12 @@ def descend(skeleton, start, target, damping, pull, metres, radians, iterations)
             task_errors(target, placed_tried[5], at_tried, facing_tried, errors_tried)
             cost_tried = cost_of(skeleton, target, pull, tried, errors_tried)
             if np.isfinite(cost) and cost_tried <= cost * (1.0 + 1e-12) + 1e-20:
+                going = np.max(np.abs(d)) > 1e-8 and cost - cost_tried > 1e-10 * cost
                 q[:] = tried
                 errors[:] = errors_tried
                 cost, placed, at, facing = cost_tried, placed_tried, at_tried, facing_tried
                 extra = min(0.2 * extra, 0.1 * cost)
                 steps += 1
-                going = np.max(np.abs(d)) > 1e-8
                 break
             extra = 5.0 * extra + damping
     misses, limited, steepest, blocked = np.empty(ROWS // 3), np.zeros(joints, np.bool_), 0.0, 0.0
