@@ -24,6 +24,7 @@ _LOOPS = """\
 
 COMMANDS = {
     "reach": "an arm learns to reach, and is asked to",
+    "walk": "a humanoid walks, by itself or under your keys",
     "experiment": "a document's table or figure, ours beside theirs",
     "doctor": "what this machine has, and lacks",
 }
@@ -31,6 +32,7 @@ COMMANDS = {
 _EXAMPLES = """\
   toddle reach nicu                                a humanoid's arm learns, live
   toddle reach my/arm.urdf --tip hand              your own robot
+  toddle walk --keys                               drive a humanoid from the terminal
   toddle doctor                                    is everything here?"""
 
 

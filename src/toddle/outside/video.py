@@ -26,6 +26,16 @@ class Film:
         self._size: tuple[int, ...] = ()
         self.pictures = 0
 
+    def __enter__(self) -> Film:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """Close it; after a fault, drop it."""
+        if kind is None:
+            self.close()
+        else:
+            self.drop()
+
     def add(self, picture: UInt8[np.ndarray, "height width 3"]) -> None:
         """One picture more.
 

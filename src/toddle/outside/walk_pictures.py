@@ -160,7 +160,7 @@ def _over_time(figure: Figure, record: Record, names: Sequence[str], title: str)
     """Axes one above the other, with one time."""
     rows: list[Any] = []
     for name in names:
-        axes = plain_axes(figure, (len(names), 1, len(rows) + 1), sharex=rows[0] if rows else None)
+        axes = plain_axes(figure, 100 * len(names) + 11 + len(rows), sharex=rows[0] if rows else None)
         axes.set_ylabel(name)
         axes.tick_params(labelbottom=len(rows) == len(names) - 1)
         rows.append(axes)

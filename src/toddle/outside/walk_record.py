@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from toddle.robots.gait import Gait
 from toddle.signals import Reference, Velocity
+from toddle.walk.loop import Measured, Moment
+from toddle.walk.pattern.plan import Interval
 from toddle.walk.pattern.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from toddle.walk.loop import Measured, Moment
 
 _WIDTHS = {  # of one tick's row
     "t": 1, "asked": 3, "allowed": 3, "com": 9, "zmp": 2, "yaw": 3, "feet": 8, "feet_velocity": 8,
@@ -119,7 +118,7 @@ class Recorder:
         self._measured.append(_measured_row(moment.measured))
         self._fell = self._fell or moment.fell
         if moment.plan is not None:
-            self.add_solve(str(moment.plan.status), moment.plan.ms)
+            self.add_solve(str(moment.plan.status), moment.plan.milliseconds)
 
     def add_plan(
         self, t: float, asked: Velocity, allowed: Velocity, plan: Reference, support: int, *, posture_ms: float = np.nan
@@ -165,27 +164,24 @@ class Recorder:
 
 def record_of_pattern(pattern: Trajectory, gait: Gait, allowed: Sequence[Velocity]) -> Record:
     """The same record of a walking pattern without a body; ``allowed``: the velocity at each iteration."""
-    rows, still = len(pattern.t), Velocity(0.0, 0.0, 0.0)
-    each = round(gait.sample / gait.command_period)
-    ahead = rows - each * len(pattern.intervals)
-    command = np.array([still] * ahead + [velocity for velocity in allowed for _ in range(each)]).reshape(rows, 3)
+    rows = len(pattern.t)
+    counts = [round(interval.duration / gait.command_period) for interval in pattern.intervals]
+    ahead = rows - sum(counts)
+    command = np.concatenate([np.zeros((ahead, 3)), np.repeat(np.array(allowed).reshape(-1, 3), counts, axis=0)])
+    supports = [_support(*part, gait) for part in zip(pattern.intervals, counts, strict=True)]
     return Record(
         pattern.t, command, command, pattern.com[:, :, :3], pattern.zmp, pattern.com[:, :, 3],
         pattern.feet[:, 0], pattern.feet[:, 1], pattern.feet[:, 2], np.full((rows, 2), np.nan),
-        _supports(pattern, gait, ahead, each), np.full(rows, np.nan), None,
+        np.concatenate([np.full(ahead, -1), *supports]), np.full(rows, np.nan), None,
         np.array([interval.milliseconds for interval in pattern.intervals], dtype=float),
         tuple(str(interval.status) for interval in pattern.intervals), False,
     )  # fmt: skip
 
 
-def _supports(pattern: Trajectory, gait: Gait, ahead: int, each: int) -> Int[np.ndarray, " ticks"]:
-    within = np.arange(each) * gait.command_period
-    parts = [np.full(ahead, -1)]
-    for interval in pattern.intervals:
-        single = interval.elapsed + within >= gait.double_support - 1e-9
-        alone = interval.landing is not None
-        parts.append(np.where(single & alone, interval.support.side, -1))
-    return np.concatenate(parts)
+def _support(interval: Interval, count: int, gait: Gait) -> Int[np.ndarray, " ticks"]:
+    elapsed = interval.elapsed + np.arange(count) * gait.command_period
+    single = (elapsed >= gait.double_support - 1e-9) & (interval.landing is not None)
+    return np.where(single, interval.support.side, -1)
 
 
 def standing(

@@ -5,15 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from itertools import islice
-from typing import Protocol
-
-import numpy as np
-from jaxtyping import UInt8
 
 from toddle.outside.simulation.disturbances import TICK
 from toddle.outside.simulation.humanoid import HumanoidSimulation
 from toddle.outside.teleoperation.commands import Source, follow
-from toddle.outside.video import FRAMES, Film
+from toddle.outside.video import FRAMES
 from toddle.outside.walk_record import Recorder
 from toddle.signals import Velocity
 from toddle.walk.loop import Moment, walk
@@ -26,14 +22,6 @@ FILMED = 60.0
 _LOOK = 10  # ticks between two looks at the truth
 _FRAME = round(1 / (FRAMES * TICK))  # ticks between two pictures
 _WARM = 130  # ticks, in which everything is called once
-
-
-class Camera(Protocol):
-    """Whatever takes pictures of a run."""
-
-    def picture(self) -> UInt8[np.ndarray, "height width 3"]:
-        """As it looks now."""
-        ...
 
 
 class Watch:
@@ -51,18 +39,16 @@ class Watch:
         self,
         moments: Iterator[Moment],
         *,
-        film: Film | None = None,
-        camera: Camera | None = None,
         tell: Callable[[Moment], None],
-        real_time: Callable[[], bool],
+        film: Callable[[], None] | None = None,
+        real_time: Callable[[], bool] = lambda: False,
     ) -> None:
         """Watch a walk to its end.
 
         Args:
             moments: the walk.
-            film: what pictures go to.
-            camera: where they come from.
             tell: is told of each moment.
+            film: takes a picture, called `FRAMES` times a simulated second.
             real_time: whether to wait for the clock.
         """
         began = last = time.perf_counter()
@@ -71,8 +57,8 @@ class Watch:
             self._recorder.add(moment)
             if number % _LOOK == 0:
                 self._recorder.add_truth(moment.t, self._simulation.truth().waist)
-            if film is not None and camera is not None and number % _FRAME == 0 and moment.t <= FILMED:
-                film.add(camera.picture())
+            if film is not None and number % _FRAME == 0 and moment.t <= FILMED:
+                film()
             tell(moment)
             if real_time():
                 time.sleep(max(began + moment.t - time.perf_counter(), 0.0))
@@ -94,6 +80,7 @@ class Heard:
         self._source, self.until = source, 0.0
 
     def __call__(self, t: float) -> Velocity | None:
+        """What the source asks for at a time [s]."""
         velocity = self._source(t)
         if velocity is not None:
             self.until = t + TICK

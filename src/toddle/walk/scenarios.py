@@ -49,32 +49,25 @@ class Scenario:
     circles: tuple[Circle, ...] = ()
 
 
-def _steady(vx: float, vy: float, omega: float) -> tuple[Leg, ...]:
-    return (Leg(0.0, Velocity(vx, vy, omega)),)
-
-
-def _stop_and_go(velocity: Velocity, period: float, times: int) -> tuple[Leg, ...]:
-    """Walk for half a period and stand for the other, so many times."""
-    return tuple(
-        Leg(period * (time + half), (velocity, STILL)[half > 0]) for time in range(times) for half in (0.0, 0.5)
-    )
-
-
 SCENARIOS = {
     scenario.name: scenario
     for scenario in (
-        Scenario("straight", "straight ahead", _steady(0.1, 0.0, 0.0)),
-        Scenario("sideways", "to the left, facing ahead", _steady(0.0, 0.1, 0.0)),
-        Scenario("curve", "ahead and turning left", _steady(0.1, 0.0, 0.1)),
-        Scenario("turn", "turning left in place", _steady(0.0, 0.0, 0.2)),
-        Scenario("diagonal", "ahead and to the left", _steady(0.1, 0.05, 0.0)),
+        Scenario("straight", "straight ahead", (Leg(0.0, Velocity(0.1, 0.0, 0.0)),)),
+        Scenario("sideways", "to the left, facing ahead", (Leg(0.0, Velocity(0.0, 0.1, 0.0)),)),
+        Scenario("curve", "ahead and turning left", (Leg(0.0, Velocity(0.1, 0.0, 0.1)),)),
+        Scenario("turn", "turning left in place", (Leg(0.0, Velocity(0.0, 0.0, 0.2)),)),
+        Scenario("diagonal", "ahead and to the left", (Leg(0.0, Velocity(0.1, 0.05, 0.0)),)),
         Scenario(
             "obstacle",
             "straight on past a cylinder beside the line",
-            _steady(0.15, 0.0, 0.0),
+            (Leg(0.0, Velocity(0.15, 0.0, 0.0)),),
             circles=(Circle(1.2, 0.3, 0.1),),
         ),
-        Scenario("stop-and-go", "five seconds of walking, five of standing", _stop_and_go(Velocity(0.15, 0, 0), 10, 2)),
+        Scenario(
+            "stop-and-go",
+            "five seconds of walking, five of standing",
+            tuple(Leg(5.0 * half, STILL if half % 2 else Velocity(0.15, 0.0, 0.0)) for half in range(4)),
+        ),
     )
 }
 """Every scenario by its name."""

@@ -26,7 +26,7 @@ from toddle.walk.gate import SILENCE, STILL
 
 HELP = "up/down w/s: speed   left/right a/d: turn   , .: sideways   + -: all faster, slower   space: stop   q: quit"
 
-QUIT, LOST = "quit", "the terminal is lost"
+QUIT, LOST, TOLD = "quit", "the terminal is lost", "told to end"
 """How driving ends."""
 
 _STEP = Velocity(0.05, 0.02, 0.1)
@@ -81,7 +81,7 @@ class Keyboard:
 
     Attributes:
         velocity: what was asked last.
-        ended: why it ended: `QUIT`, `LOST`, or nothing yet.
+        ended: why it ended: `QUIT`, `LOST`, `TOLD` by a signal, or nothing yet.
     """
 
     def __init__(self, fastest: Velocity, *, clock: Callable[[], float] = time.monotonic) -> None:
@@ -96,7 +96,7 @@ class Keyboard:
         except (AttributeError, OSError, ValueError, termios.error):
             raise BadInput("standard input is no terminal", where="--keys", remedy="run it in a terminal") from None
         self._screens = [number for number in (1, 2) if os.isatty(number)]
-        self._handlers = {number: signal.signal(number, self._hang_up) for number in (signal.SIGHUP, signal.SIGTERM)}
+        self._handlers = {number: signal.signal(number, self._signalled) for number in (signal.SIGHUP, signal.SIGTERM)}
         _listen(self._terminal)
         self._heard = self._clock()
         return self
@@ -135,8 +135,10 @@ class Keyboard:
         keys, self._pending = keys_in(self._pending + heard)
         return keys
 
-    def _hang_up(self, _number: int, _frame: FrameType | None) -> None:
-        self._lose()
+    def _signalled(self, number: int, _frame: FrameType | None) -> None:
+        if number == signal.SIGHUP:
+            self._lose()
+        self.ended = self.ended or TOLD
 
     def _lose(self) -> None:
         """End, and write no more to a terminal that is gone: each write would be a fault."""

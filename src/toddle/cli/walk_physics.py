@@ -1,0 +1,221 @@
+"""``toddle walk`` in physics: the robot, the world, who commands, and what is left of it."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from toddle.cli.run_folder import new_folder
+from toddle.cli.walk_folder import leave, tell
+from toddle.failures import ToddleError
+
+if TYPE_CHECKING:
+    from toddle.cli.walk import Task, Walk
+    from toddle.outside.simulation.disturbances import WorldOptions
+    from toddle.outside.simulation.humanoid import HumanoidSimulation
+    from toddle.outside.simulation.pictures import Camera
+    from toddle.outside.teleoperation.keys import Keyboard
+    from toddle.outside.walk_run import Watch
+    from toddle.robots.gait import Gait
+    from toddle.signals import Velocity
+    from toddle.walk.loop import Moment
+    from toddle.walk.walker import Walker
+
+_STOPPED = 130
+
+
+def walk_in_physics(asked: Walk) -> int:
+    """Walk, leave a folder, tell the figures; returns the exit code."""
+    from toddle.cli.walk import DEFAULT_ROBOT, task_of, tell_capped
+    from toddle.outside.simulation.humanoid import HumanoidSimulation
+    from toddle.outside.video import Film
+    from toddle.outside.walk_figures import figures_of
+    from toddle.outside.walk_record import Recorder
+    from toddle.outside.walk_run import Watch, warm_up
+    from toddle.outside.walk_trajectory import write_trajectory
+    from toddle.robots.humanoids import load_humanoid
+    from toddle.walk.walker import walker
+
+    spec = asked.robot or DEFAULT_ROBOT
+    humanoid = load_humanoid(spec, asked.config)
+    for note in humanoid.notes:
+        print(f"{humanoid.name}: {note}", file=sys.stderr)
+    task = task_of(asked, humanoid.gait)
+    tell_capped(task, _capped(humanoid.gait), humanoid.name)
+    options = _world(asked, task)
+    walks, simulation = walker(humanoid, _walk_config(asked)), HumanoidSimulation(humanoid, options)
+    folder = new_folder(asked.out, f"walk-{humanoid.name}")
+    warm_up(walks, simulation)
+    recorder = Recorder()
+    watch, camera = Watch(recorder, simulation), _camera(asked, simulation)
+    with Film(folder / "walk.mp4") as film:
+        picture = None if camera is None else lambda: film.add(camera.picture())
+        try:
+            until, stopped = _walk(task, walks, simulation, watch, picture)
+        except Exception:
+            write_trajectory(folder / "trajectory.parquet", recorder.record())
+            raise
+    record = recorder.record()
+    figures = {
+        "robot": humanoid.name,
+        "scenario": task.name,
+        **figures_of(record, humanoid.gait, until=until, wall=watch.wall),
+        "touched": bool(simulation.touched.any()) if task.circles else None,
+    }
+    leave(folder, record, humanoid.gait, figures, _config(asked, task, walks, options), task.circles)
+    tell(figures, folder, as_json=asked.json)
+    if record.fell:
+        print(f"toddle: {humanoid.name} fell after {record.t[-1]:.1f} s", file=sys.stderr)
+        return 1
+    return _STOPPED if stopped else 0
+
+
+def _capped(gait: Gait) -> Callable[[Velocity], Velocity]:
+    """What the safety gate lets through in the end."""
+    from toddle.walk.gate import STILL, gate
+
+    return lambda velocity: gate(STILL, velocity, gait.fastest, gait.sample, limited=False)
+
+
+def _walk(
+    task: Task, walks: Walker, simulation: HumanoidSimulation, watch: Watch, film: Callable[[], None] | None
+) -> tuple[float, bool]:
+    """Walk to the end: until when it was commanded [s], and whether somebody interrupted it."""
+    from toddle.outside.teleoperation.commands import follow, until
+    from toddle.outside.teleoperation.keys import Keyboard
+    from toddle.outside.terminal import stoppable
+    from toddle.outside.walk_run import Heard
+
+    with ExitStack() as stack:
+        keyboard = None if task.legs else stack.enter_context(Keyboard(walks.gait.fastest))
+        stop = stack.enter_context(stoppable())
+        source = follow(task.legs, task.seconds) if keyboard is None else _for(keyboard, task.seconds)
+        heard = Heard(until(lambda: stop.asked, source))
+        show = _shown(stack, task, walks, keyboard)
+        try:
+            watch(
+                _moments(task, walks, simulation, heard),
+                tell=show,
+                film=film,
+                real_time=lambda: keyboard is not None and not keyboard.ended,
+            )
+        except KeyboardInterrupt:  # the second Ctrl-C: what there is so far counts
+            return heard.until, True
+        return heard.until, stop.asked
+
+
+def _for(keyboard: Keyboard, seconds: float) -> Callable[[float], Any]:
+    return lambda t: keyboard(t) if t < seconds else None
+
+
+def _moments(
+    task: Task, walks: Walker, simulation: HumanoidSimulation, heard: Callable[[float], Any]
+) -> Iterator[Moment]:
+    """The walk; pushes are told to the world once it has begun, since that forgets them at the start."""
+    from toddle.walk.loop import walk
+
+    for number, moment in enumerate(walk(walks, simulation, heard, circles=task.circles)):
+        if number == 0:
+            for push in task.pushes:
+                simulation.push(push.impulse, math.radians(push.direction), start=push.t)
+        yield moment
+
+
+def _shown(stack: ExitStack, task: Task, walks: Walker, keyboard: Keyboard | None) -> Callable[[Moment], None]:
+    """What tells a person how the walk goes: a panel for who drives, a bar for who waits."""
+    from toddle.outside.teleoperation.keys import HELP
+    from toddle.outside.teleoperation.panel import Panel
+    from toddle.outside.terminal import Reporter
+
+    name = walks.humanoid.name
+    if keyboard is not None:
+        panel = stack.enter_context(Panel(f"{name} walks", HELP))
+        return _Telling(panel).tell
+    reporter = stack.enter_context(Reporter(f"{name} walks", math.ceil(task.seconds)))
+
+    def tell_bar(moment: Moment) -> None:
+        seconds = min(int(moment.t), math.ceil(task.seconds))
+        reporter.tell(seconds, f"s, ZMP margin {100 * moment.measured.margin:.1f} cm")
+
+    return tell_bar
+
+
+class _Telling:
+    """Turns moments into what a panel shows."""
+
+    def __init__(self, panel: Any) -> None:
+        self._panel, self._began, self._distance, self._solver = panel, time.perf_counter(), 0.0, "-"
+
+    def tell(self, moment: Moment) -> None:
+        from toddle.outside.simulation.disturbances import TICK
+        from toddle.outside.teleoperation.panel import Status
+
+        velocity = moment.measured.velocity
+        if math.isfinite(velocity.vx):
+            self._distance += math.hypot(velocity.vx, velocity.vy) * TICK
+        if moment.plan is not None:
+            self._solver = str(moment.plan.status)
+        clock = max(time.perf_counter() - self._began, 1e-9)
+        self._panel.tell(
+            Status(
+                moment.t, moment.asked, moment.allowed, velocity, moment.measured.margin, moment.support,
+                self._solver, moment.t / clock, self._distance,
+            )
+        )  # fmt: skip
+
+
+def _camera(asked: Walk, simulation: HumanoidSimulation) -> Camera | None:
+    """What films, where there is something to draw with; otherwise a line says so."""
+    from toddle.outside.simulation.pictures import Camera
+
+    if asked.video is False or (asked.video is None and asked.keys):
+        return None
+    try:
+        return Camera(simulation)
+    except ToddleError as fault:
+        print(f"toddle: no film: {fault.line}", file=sys.stderr)
+        return None
+
+
+def _world(asked: Walk, task: Task) -> WorldOptions:
+    from toddle.outside.simulation.disturbances import SILENT, Noise, WorldOptions
+
+    scale = asked.noise or 0.0
+    noise = Noise(*(scale * deviation for deviation in asdict(Noise()).values())) if scale else SILENT
+    given: dict[str, Any] = {
+        "friction": asked.friction,
+        "tilt_deg": asked.tilt,
+        "mass_error": asked.mass_error,
+        "delay_s": None if asked.delay is None else asked.delay / 1000,
+        "lag_s": None if asked.lag is None else asked.lag / 1000,
+    }
+    known = {name: value for name, value in given.items() if value is not None}
+    return WorldOptions(**known, noise=noise, circles=task.circles, seed=asked.seed)
+
+
+def _walk_config(asked: Walk) -> Any:
+    from toddle.walk.config import WalkConfig
+
+    return WalkConfig(deadline_ms=asked.deadline)
+
+
+def _config(asked: Walk, task: Task, walks: Walker, options: WorldOptions) -> dict[str, Any]:
+    """What a reader needs to make the same again."""
+    return {
+        "robot": asked.robot or walks.humanoid.name,
+        "config": None if asked.config is None else str(asked.config),
+        "weights": asked.weights,
+        "scenario": task.name,
+        "legs": [[leg.t, *leg.velocity] for leg in task.legs],
+        "seconds": task.seconds,
+        "pushes": [push._asdict() for push in task.pushes],
+        "seed": asked.seed,
+        "gait": asdict(walks.gait),
+        "walker": asdict(walks.config),
+        "world": asdict(options),
+    }
