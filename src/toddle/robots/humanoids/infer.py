@@ -125,7 +125,8 @@ def _spine(body: Skeleton, legs: Legs) -> set[int]:
 def _anatomy(body: Skeleton, settings: Settings, where: str, notes: list[str]) -> Anatomy:
     legs = find_legs(body, (settings.left_foot, settings.right_foot), where)
     ankles = np.array([_ankle(body, foot) for foot in legs.feet])
-    upward = poses(body)[legs.fork][0] - ankles.mean(axis=0)
+    hips = np.array([poses(body)[chain[0]][0] for chain in legs.chains])
+    upward = (hips - ankles).mean(axis=0)
     axes = axes_of(ankles[LEFT] - ankles[RIGHT], upward)
     if not legs.sided and _backward(body, legs, axes, ankles):
         legs, ankles = Legs(legs.fork, (legs.chains[1], legs.chains[0]), sided=False), ankles[::-1]
@@ -142,6 +143,8 @@ def _anatomy(body: Skeleton, settings: Settings, where: str, notes: list[str]) -
             )
     if not legs.sided:
         notes.append(f"left and right, from the toes: {body[legs.feet[LEFT]].name} is the left foot")
+    if sum(len(body[link].hinges) for link in legs.chains[LEFT]) == 5:
+        notes.append("its legs have five joints: soles can't be kept flat while the pelvis sways")
     return Anatomy(legs, find_chest(body, legs), axes, ankles)
 
 
@@ -210,7 +213,7 @@ def _sole(body: Skeleton, anatomy: Anatomy, settings: Settings, where: str, note
     sole = Sole(*(own if own is not None else other for own, other in zip(given, guess, strict=True)))
     kind = "colliding" if solid else "visible"
     notes.append(
-        f"soles, from the feet's {kind} geometry where not given: {sole.length:.3f} x {sole.width:.3f} m, "
+        f"soles (from the feet's {kind} geometry, what is not given): {sole.length:.3f} x {sole.width:.3f} m, "
         f"middle {100 * sole.ahead:.1f} cm ahead of the ankle, {100 * sole.depth:.1f} cm under it"
     )
     return sole

@@ -168,7 +168,7 @@ def axes_of(lateral: Float[np.ndarray, "3"], upward: Float[np.ndarray, "3"]) -> 
 
     Args:
         lateral: from the right ankle to the left one.
-        upward: from the ankles to the pelvis.
+        upward: from the ankles to the hips.
     """
     up = np.zeros(3)
     steepest = np.argmax(np.abs(upward))

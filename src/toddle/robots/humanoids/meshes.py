@@ -1,7 +1,6 @@
 """Meshes that MuJoCo does not read, as clouds of vertices: Collada (.dae), text STL, and STL with too many faces.
 
-Collada's scene graph places its geometries; its unit is applied and its up axis is not, as in the usual viewers of
-URDF files (https://github.com/ros-visualization/rviz, mesh_loader.cpp).
+Collada's scene graph places its geometries; its unit and its up axis are applied (COLLADA 1.4.1, <asset>).
 """
 
 from __future__ import annotations
@@ -17,6 +16,10 @@ from toddle.failures import BadInput
 from toddle.robots.markup import parse
 
 _MOST_FACES = 200_000  # MuJoCo's own limit
+_UPRIGHT = {
+    "Y_UP": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
+    "X_UP": np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]),
+}
 _RECORD = np.dtype([("normal", "<3f4"), ("corners", "<9f4"), ("word", "<u2")])
 
 
@@ -74,7 +77,8 @@ def _collada(path: Path) -> Float[np.ndarray, "vertices 3"]:
     ]
     unit = root.find("asset/unit")
     scale = float(unit.get("meter", "1")) if unit is not None else 1.0
-    return scale * np.vstack(placed or list(shapes.values()))
+    upright = _UPRIGHT.get(root.findtext("asset/up_axis", "Z_UP").strip(), np.eye(3))
+    return scale * np.vstack(placed or list(shapes.values())) @ upright.T
 
 
 def _positions(geometry: Element) -> Float[np.ndarray, "vertices 3"]:

@@ -20,7 +20,7 @@ from toddle.robots.humanoids.soles import Sole, cloud
 
 TIMESTEP = 0.002  # [s]
 SOLE_BIT, SHELL_BIT = 1, 2
-SHELL_GROUP, SOLE_GROUP = 4, 3  # hidden unless asked for
+SHELL_GROUP, SOLE_GROUP, SHOWN_GROUP = 4, 3, 2  # the first two are hidden unless asked for
 EYES_APART = 0.068  # [m] Huber 2019: the stereo cameras of Heicub
 FIELD_OF_VIEW = 54.3  # [deg] of 240 rows at 234 pixels, the rectified calibration of the same
 _THICKNESS = 0.01  # of a sole [m]
@@ -92,8 +92,10 @@ def _bodies(spec: Any, skeleton: Skeleton, servos: Servos) -> list[Any]:
             _hinge(body, hinge, float(servos.reflected[joint]))
             joint += 1
         _weigh(body, link)
+        dressed = any(not shape.solid for shape in link.shapes)
         for place, shape in enumerate(link.shapes):
-            _show(spec, body, shape, f"{link.name}_{place}")
+            hidden = shape.solid and dressed
+            _show(spec, body, shape, f"{link.name}_{place}", SOLE_GROUP if hidden else SHOWN_GROUP)
         _shell(body, link)
         bodies.append(body)
     return bodies
@@ -113,7 +115,7 @@ def _weigh(body: Any, link: Link) -> None:
     body.mass, body.ipos, body.iquat, body.inertia = link.mass, link.centre, quaternion(axes), moments
 
 
-def _show(spec: Any, body: Any, shape: Shape, name: str) -> None:
+def _show(spec: Any, body: Any, shape: Shape, name: str, group: int) -> None:
     geom = body.add_geom(
         type=mujoco.mjtGeom(shape.type),
         size=shape.size,
@@ -122,7 +124,7 @@ def _show(spec: Any, body: Any, shape: Shape, name: str) -> None:
         rgba=shape.rgba,
         contype=0,
         conaffinity=0,
-        group=2 if not shape.solid else 3,
+        group=group,
         mass=0.0,
     )
     if shape.vertices is not None:

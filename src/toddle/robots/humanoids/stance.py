@@ -87,6 +87,8 @@ def stance(
             remedy=f"with straight legs it is {_height(model, straight):.3f} m high, with bent ones "
             f"{_height(model, bent):.3f} m: give com_height in between, and foot_distance near the hips' width",
         )
+    if settings.hull is None and settings.gait is None:
+        gait = _shrunk(model, gait, bends, found.q, notes)
     _check_hull(model, gait, bends, found.q, where)
     return gait, found.q
 
@@ -176,23 +178,47 @@ def _hull(distance: float, scale: float) -> tuple[tuple[float, float], ...]:
     return ((-reach, inner), (-reach, outer), (reach, outer), (reach, inner))
 
 
-def _check_hull(model: Any, gait: Gait, bends: Legs3, home: Float[np.ndarray, " positions"], where: str) -> None:
-    """Each leg takes half of a step; from hip to ankle that is no longer than the leg stretched.
-
-    Raises:
-        BadInput: a corner of the hull is too far.
-    """
+def _reach(
+    model: Any, gait: Gait, bends: Legs3, home: Float[np.ndarray, " positions"]
+) -> tuple[Float[np.ndarray, " corners"], float]:
+    """The legs that each corner of the hull asks for, each leg taking half of the step, and the legs there are [m]."""
     data = mujoco.MjData(model)
     data.qpos[:] = home
     mujoco.mj_kinematics(model, data)
     hip, knee, ankle = (data.xanchor[number + 1] for number, _, _ in bends[LEFT])
     longest = float(np.linalg.norm(knee - hip) + np.linalg.norm(ankle - knee))
-    for x, y in gait.hull:
-        step = np.array([x / 2, (y - gait.foot_distance) / 2, 0.0])
-        far = max(float(np.linalg.norm(ankle + sign * step - hip)) for sign in (1.0, -1.0))
-        if far > longest:
-            raise BadInput(
-                f"its corner ({x:g}, {y:g}) m asks for legs of {far:.3f} m, and they have {longest:.3f} m",
-                where=f"{where}: hull",
-                remedy="bring that corner nearer, or lower com_height",
-            )
+    steps = np.array([[x / 2, (y - gait.foot_distance) / 2, 0.0] for x, y in gait.hull])
+    asked = [max(float(np.linalg.norm(ankle + sign * step - hip)) for sign in (1.0, -1.0)) for step in steps]
+    return np.array(asked), longest
+
+
+def _shrunk(model: Any, gait: Gait, bends: Legs3, home: Float[np.ndarray, " positions"], notes: list[str]) -> Gait:
+    """The gait with its hull drawn together, around where the foot stands, until the legs can span it."""
+    whole = np.array(gait.hull)
+    middle = np.array([0.0, gait.foot_distance])
+    for percent in range(100, 30, -5):
+        corners = middle + percent / 100 * (whole - middle)
+        gait = replace(gait, hull=tuple((float(x), float(y)) for x, y in corners))
+        asked, longest = _reach(model, gait, bends, home)
+        if asked.max() <= longest:
+            break
+    if percent < 100:
+        notes.append(f"hull drawn together to {percent} %, which the legs can span")
+    return gait
+
+
+def _check_hull(model: Any, gait: Gait, bends: Legs3, home: Float[np.ndarray, " positions"], where: str) -> None:
+    """Refuses a hull with a corner that the legs can't span.
+
+    Raises:
+        BadInput: there is one.
+    """
+    asked, longest = _reach(model, gait, bends, home)
+    worst = int(asked.argmax())
+    if asked[worst] > longest:
+        x, y = gait.hull[worst]
+        raise BadInput(
+            f"its corner ({x:g}, {y:g}) m asks for legs of {asked[worst]:.3f} m, and they have {longest:.3f} m",
+            where=f"{where}: hull",
+            remedy="bring that corner nearer, or lower com_height",
+        )
