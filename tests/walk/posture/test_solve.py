@@ -212,6 +212,14 @@ def test_a_robot_without_a_torso_answers() -> None:
     assert settle(posture_model(stiff), HUMANOID.home, REACHABLE[2]).verdict is Verdict.REACHED
 
 
+def test_joints_beyond_their_limits_come_back_even_where_no_step_is_made() -> None:
+    start = HUMANOID.home.copy()
+    start[7:][HUMANOID.moves] = HUMANOID.upper[HUMANOID.moves] + 0.1
+    posture = solve_posture(MODEL, start, target(com=(0, 0, np.nan)))
+    np.testing.assert_array_equal(posture.q[7:], np.minimum(start[7:], HUMANOID.upper))
+    assert np.array_equal(posture.at_limit, HUMANOID.moves)
+
+
 @pytest.mark.parametrize("height", [np.nan, np.inf, 1e200])
 def test_what_is_not_finite_leaves_the_posture_as_it_was(height: float) -> None:
     posture = solve_posture(MODEL, HUMANOID.home, target(com=(0, 0, height)), 3)
