@@ -34,6 +34,7 @@ class WalkConfig:
         latest: and at most so many nominal times.
         freeze: the landing is no longer moved so shortly before it [s].
         touchdown: share of the swing after which contact ends the step.
+        lowering: the swing foot is just over the floor so long before it is to land, and then lowered [s].
         late: a step waits so long for its touchdown [s].
         shift_time: of the weight shift before the first step [s].
         lead: the next plan is made so long after the last [s].
@@ -58,6 +59,7 @@ class WalkConfig:
     latest: float = 1.15
     freeze: float = 0.06
     touchdown: float = 0.6
+    lowering: float = 0.03
     late: float = 0.15
     shift_time: float = 0.3
     lead: float = 0.1

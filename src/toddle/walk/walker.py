@@ -280,7 +280,7 @@ class Walker:
         feet = rest(feet, step.stance, state.anchors[step.stance], TICK)
         dx, dy = rotate(step.foot[2], step.landing)
         goal = (step.foot[0] + dx, step.foot[1] + dy, step.foot[2] + step.turn)
-        done, left = step.phase - step.double_support, step.end - step.phase
+        done, left = step.phase - step.double_support, step.end - self.config.lowering - step.phase
         return swing(feet, 1 - step.stance, goal, self.gait.step_height, done, left, TICK)
 
     def _reference(self, state: WalkerState) -> Reference:
@@ -310,7 +310,7 @@ class Walker:
     ) -> tuple[WalkerState, Action]:
         started = time.perf_counter()
         target = self._target(state, reference)
-        posture = solve_posture(self.model, state.q, target)
+        posture = solve_posture(self.model, state.q, target, 3)
         servo = posture.q[7:]
         if self.config.feed_forward:
             servo = servo + self._sag(posture.q, state)
@@ -345,7 +345,7 @@ class Walker:
 
 
 _FAR = 0.03  # a landing this far from the plan was moved by a push, not by the gait's own error [m]
-_FREE = 0.03
+_FREE = 0.0003
 _PITCH_ROW = (7, 13)  # com 3, then each sole: position 3, rotation 3 about its own x, y, z
 
 
