@@ -42,9 +42,9 @@ def test_what_is_no_view_or_no_size_is_refused(simulation: HumanoidSimulation) -
 
 
 def test_a_machine_that_cannot_draw_says_so(simulation: HumanoidSimulation, monkeypatch: pytest.MonkeyPatch) -> None:
-    def missing(name: str) -> None:
-        raise ImportError(f"no {name} here")
+    def broken(*_: object) -> None:
+        raise RuntimeError("no OpenGL platform")
 
-    monkeypatch.setattr("importlib.import_module", missing)
-    with pytest.raises(ToddleError, match=r"nothing here can draw \(no mujoco.*MUJOCO_GL"):
+    monkeypatch.setattr("mujoco.MjrContext", broken)
+    with pytest.raises(ToddleError, match=r"nothing here can draw.*MUJOCO_GL"):
         Camera(simulation)

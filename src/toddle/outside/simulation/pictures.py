@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 import os
 import sys
@@ -34,7 +33,7 @@ _THICK = 0.0008  # of a footprint [m]
 class Camera:
     """Draws one simulation, picture by picture."""
 
-    def __init__(self, simulation: HumanoidSimulation, width: int = 960, height: int = 540, view: str = "side") -> None:
+    def __init__(self, simulation: HumanoidSimulation, width: int = 640, height: int = 360, view: str = "side") -> None:
         """Opens what draws.
 
         Args:
@@ -130,7 +129,11 @@ def _drawing(model: mujoco.MjModel, width: int, height: int) -> tuple[Any, Any]:
     """An OpenGL context and MuJoCo's; without a screen, and nothing said, that is EGL."""
     headless = sys.platform == "linux" and not any(os.environ.get(name) for name in ("MUJOCO_GL", "DISPLAY"))
     try:
-        gl = importlib.import_module("mujoco.egl" if headless else "mujoco.gl_context").GLContext(width, height)
+        if headless:
+            from mujoco.egl import GLContext
+        else:
+            from mujoco.gl_context import GLContext
+        gl = GLContext(width, height)
         gl.make_current()
         context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, context)
