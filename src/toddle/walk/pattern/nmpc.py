@@ -6,8 +6,9 @@ the ZMP's reference passes from foot to foot during double support, so an iterat
 and end it at any time. Gauss-Newton, one step an iteration: yaws are linearised at those of the command, to which a
 strong residual ties them, feet and ZMP at the last plan.
 
-Foot hulls and relative yaw are hard rows and can always be kept. ZMP and clearance are soft, so that there always is
-an answer; ``violation`` and ``overlap`` say by how much they are exceeded. An answer that is late, not finite or
+A plan must end where further steps can catch the robot (`nmpc_kernels.capture_rows`); the document doesn't ask that.
+Foot hulls and relative yaw are hard rows and can always be kept. Balance and clearance are soft, so that there is an
+answer always; ``violation`` and ``overlap`` say by how much they are exceeded. An answer that is late, not finite or
 breaks a hard row isn't used: the last plan is, shifted to now.
 """
 
@@ -125,7 +126,7 @@ class Plan(NamedTuple):
         status: solved, or why this is the last plan shifted.
         milliseconds: the iteration took, wall clock.
         obstacle: a clearance decides the plan.
-        violation: of the soft ZMP rows, the greatest [m].
+        violation: of the soft rows of balance (ZMP, capture at the horizon's end), the greatest [m].
         overlap: of the soft clearance rows, the greatest [m].
         state: it was made at.
     """
@@ -178,6 +179,8 @@ def nmpc(gait: Gait, weights: Weights | None = None, *, freeze: float = 0.06, bo
         hull.rows,
     )
     front, rear = (gait.foot_ahead + way * (gait.foot_length / 2 - gait.margin[0]) for way in (1, -1))
+    growth = math.exp(gait.omega * gait.step_time)
+    inner, outer = hull.corners[:, 1].min(), hull.corners[:, 1].max()
     numbers = Numbers(
         alpha=weights.alpha,
         beta=weights.beta,
@@ -198,6 +201,10 @@ def nmpc(gait: Gait, weights: Weights | None = None, *, freeze: float = 0.06, bo
         gap=GAP,
         body=gait.foot_distance / 2 + 0.12 if body is None else body,
         reach=hull.reach,
+        omega=gait.omega,
+        end_ahead=float(np.abs(hull.corners[:, 0]).max() * growth / (growth - 1)),
+        end_inner=float((inner - outer / growth) / (1 - growth**-2)),
+        end_outer=float((outer - inner / growth) / (1 - growth**-2)),
     )
     return Nmpc(gait, weights, tables, numbers, freeze)
 
@@ -252,10 +259,10 @@ def _solve(
     around = near(circles, foot.x, foot.y, wide) if len(circles) else NONE
     pinned = known and 0 < state.remaining <= problem.freeze and state.halt != 0
     tables, moment = problem.tables, _moment(state, velocity)
-    matrix, low, high, marks, y, lower, inverse, shares, hard, zmp = assemble(
+    matrix, low, high, marks, slack, y, lower, inverse, shares, hard, zmp = assemble(
         tables, numbers, moment, com, drawn, yaws, guess.feet - place, guess.jerks, around, pinned
     )
-    answer = least_distance(matrix, low, high, marks, None if deadline_ms is None else deadline_ms / 1e3)
+    answer = least_distance(matrix, low, high, marks, slack, None if deadline_ms is None else deadline_ms / 1e3)
     if answer.status != Status.SOLVED:
         return guess._replace(status=answer.status)
     jerks, feet, displacement, reference, figures = unfold(

@@ -19,6 +19,7 @@ import numpy as np
 from numba import njit
 
 SOFT = 8  # DAQP's mark of a row that may be violated
+SLACK_ZMP, SLACK_FEET, SLACK_BODY = 1e-8, 1e-6, 1e-5  # violation e costs e^2 / (2 slack): balance before clearance
 FOOT_PATH = (1.0, 0.7, 0.35)  # where a swing foot is kept clear: shares of its way, landing first
 BODY_ROWS = 4  # how often the body is kept clear over the horizon
 
@@ -60,6 +61,10 @@ class Numbers(NamedTuple):
     gap: float
     body: float
     reach: float
+    omega: float
+    end_ahead: float
+    end_inner: float
+    end_outer: float
 
 
 class Moment(NamedTuple):
@@ -284,6 +289,71 @@ def zmp_rows(matrix, low, high, m, tables, numbers, moment, shares, base, drift,
 
 
 @njit(cache=True)
+def capture_rows(matrix, low, high, m, tables, numbers, moment, shares, lower, inverse, com, yaws):
+    """Where the horizon ends, the DCM lies where further steps can catch it; without, a plan may end in a fall.
+
+    With r until the next landing and the ZMP on the foot that stands then, less what double support leaves to it,
+    (xi - F) e^(omega r) has to lie between the offsets from which steps of the greatest drift to either side start. A
+    robot that stands by then holds the DCM where the ZMP may be.
+    """
+    count, feet = shares.shape[0], shares.shape[1] - 2
+    i = count - 1
+    t = count * numbers.sample
+    row = np.zeros(count + feet)
+    for j in range(count):
+        row[j] = tables.w_position[i, j] + tables.w_velocity[i, j] / numbers.omega
+        for k in range(feet):
+            for n in range(k, feet):
+                row[count + n] -= inverse[n, k] * lower[k, j] * row[j]
+    weights = np.zeros(feet)
+    known = np.zeros(2)
+    for j in range(3):
+        factor = tables.position_state[i, j] + tables.velocity_state[i, j] / numbers.omega
+        known += factor * com[:, j]
+    landed = 0
+    while landed < feet and t > moment.remaining + landed * numbers.step_time - 1e-9 and landed != moment.halt:
+        landed += 1
+    if landed == moment.halt:
+        known[0] -= shares[i, 0] * moment.origin_x
+        known[1] -= shares[i, 0] * moment.origin_y
+        weights[:] = shares[i, 2:]
+        rear, front, least, most = numbers.rear, numbers.front, -numbers.side, numbers.side
+    else:
+        over = 1.0 - shares[i, 0]
+        if landed > 0:
+            over = (t - moment.remaining - (landed - 1) * numbers.step_time) / max(numbers.double_support, 1e-9)
+        rest = max(1.0 - over, 0.0)
+        lag = numbers.omega * rest * numbers.double_support
+        old = rest * (1.0 - (1.0 - math.exp(-lag)) / lag) if lag > 1e-9 else 0.0
+        if landed > 0:
+            weights[landed - 1] = 1.0 - old
+            if landed > 1:
+                weights[landed - 2] = old
+        else:
+            known[0] -= old * moment.origin_x
+            known[1] -= old * moment.origin_y
+        left = max(moment.remaining + landed * numbers.step_time - t, 0.0)
+        fade = math.exp(-numbers.omega * left)
+        side = -moment.sign if landed % 2 == 0 else moment.sign
+        front, rear = fade * numbers.end_ahead, -fade * numbers.end_ahead
+        least = fade * min(side * numbers.end_inner, side * numbers.end_outer)
+        most = fade * max(side * numbers.end_inner, side * numbers.end_outer)
+    cos, sin = math.cos(yaws[landed]), math.sin(yaws[landed])
+    for axis in range(2):
+        x, y = (cos, sin) if axis == 0 else (-sin, cos)
+        for j in range(count + feet):
+            matrix[m, j] = x * row[j]
+            matrix[m, count + feet + j] = y * row[j]
+        for k in range(feet):
+            add_foot(matrix[m], inverse, count, feet, k, -x * weights[k], -y * weights[k])
+        value = x * known[0] + y * known[1]
+        low[m] = (rear if axis == 0 else least) - value
+        high[m] = (front if axis == 0 else most) - value
+        m += 1
+    return m
+
+
+@njit(cache=True)
 def swing_share(phase, first, remaining):
     """How much of the swing foot's way lies behind it: the fifth-order polynomial of 2.97 to 2.110."""
     s = min(max((phase - first) / max(phase + remaining - first, 1e-9), 0.0), 1.0)
@@ -375,7 +445,7 @@ def body_clearance(matrix, low, m, tables, numbers, lower, inverse, com, jerks, 
 
 @njit(cache=True)
 def assemble(tables, numbers, moment, com, steps, yaws, last, jerks, circles, pinned):
-    """The least-distance problem: rows, bounds, marks; and what `unfold` needs to go back.
+    """The least-distance problem: rows, bounds, marks, slacks; and what `unfold` needs to go back.
 
     ``com`` 2 x 3, ``steps`` F x 2 displacements, ``yaws`` F + 1 (the standing foot's first), ``last`` F x 3 the last
     plan's feet, ``jerks`` 2 x N the last plan's, ``circles`` C x 3; positions relative to the foot that stands.
@@ -415,17 +485,21 @@ def assemble(tables, numbers, moment, com, steps, yaws, last, jerks, circles, pi
         for j in range(i + 1):
             error[i, 0] += tables.zmp_jerk[i, j] * jerks[0, j]
             error[i, 1] += tables.zmp_jerk[i, j] * jerks[1, j]
-    most = feet * (tables.hull.shape[0] + 1) + 3 + 2 * count + circles.shape[0] * (3 * feet + BODY_ROWS)
+    most = feet * (tables.hull.shape[0] + 1) + 5 + 2 * count + circles.shape[0] * (3 * feet + BODY_ROWS)
     matrix = np.zeros((most, wide))
     low, high = np.empty(most), np.full(most, 1e30)
     hard = foot_rows(matrix, low, high, tables, numbers, moment, inverse, yaws, last, pinned)
     zmp = zmp_rows(matrix, low, high, hard, tables, numbers, moment, shares, base, drift, error, yaws)
-    m = zmp
+    zmp = capture_rows(matrix, low, high, zmp, tables, numbers, moment, shares, lower, inverse, com, yaws)
+    m = clear = zmp
     if circles.shape[0] > 0:
-        m = foot_clearance(matrix, low, m, numbers, moment, inverse, yaws, last, circles)
-        m = body_clearance(matrix, low, m, tables, numbers, lower, inverse, com, jerks, circles)
-    marks = np.zeros(m, np.int32)
+        clear = foot_clearance(matrix, low, m, numbers, moment, inverse, yaws, last, circles)
+        m = body_clearance(matrix, low, clear, tables, numbers, lower, inverse, com, jerks, circles)
+    marks, slack = np.zeros(m, np.int32), np.ones(m)
     marks[hard:] = SOFT
+    slack[hard:zmp] = SLACK_ZMP
+    slack[zmp:clear] = SLACK_FEET
+    slack[clear:] = SLACK_BODY
     for i in range(m):
         shift = 0.0
         for j in range(count + feet):
@@ -433,7 +507,7 @@ def assemble(tables, numbers, moment, com, steps, yaws, last, jerks, circles, pi
         low[i] += shift
         if high[i] < 1e29:
             high[i] += shift
-    return matrix[:m], low[:m], high[:m], marks, y, lower, inverse, shares, hard, zmp
+    return matrix[:m], low[:m], high[:m], marks, slack, y, lower, inverse, shares, hard, zmp
 
 
 @njit(cache=True)

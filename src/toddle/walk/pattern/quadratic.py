@@ -1,13 +1,14 @@
 """Least-distance problems through DAQP, and what may be done with their answers.
 
-    min |u|^2 / 2   with   low <= M u <= high,   some rows soft
+    min |u|^2 / 2 + sum e_i^2 / (2 slack_i)   with   low - e <= M u <= high + e,   e = 0 for hard rows
 
-DAQP turns every quadratic programme into this form itself (Arnstrom, Bemporad, Axehill 2022); handed over in it, the
-factorisation of the Hessian drops out. A soft row of unit norm may be exceeded by e at the cost e^2 / (2 `SLACK`).
+DAQP turns every quadratic programme into this form itself (Arnstrom, Bemporad, Axehill 2022); handed over in it, with
+the identity for a Hessian, the factorisation drops out.
 """
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import daqp
@@ -16,11 +17,7 @@ from jaxtyping import Float, Int32
 
 from toddle.walk.pattern.plan import Status
 
-SLACK = 1e-6
-"""Reciprocal of a soft row's weight, on the row scaled to norm 1."""
-
-_ITERATIONS = 500  # a solve takes about ten
-_TOLERANCE = 1e-9  # of a row scaled to norm 1
+_SETTINGS = {"iter_limit": 500, "primal_tol": 1e-9}  # a solve takes about ten; tolerance of a row scaled to norm 1
 
 
 class Answer(NamedTuple):
@@ -42,6 +39,7 @@ def least_distance(
     low: Float[np.ndarray, " rows"],
     high: Float[np.ndarray, " rows"],
     marks: Int32[np.ndarray, " rows"],
+    slack: Float[np.ndarray, " rows"],
     seconds: float | None = None,
 ) -> Answer:
     """The point nearest to zero that keeps the rows.
@@ -51,22 +49,28 @@ def least_distance(
         low: bounds; -1e30 for none.
         high: bounds; 1e30 for none.
         marks: 8 for a soft row, 0 for a hard one.
+        slack: reciprocal of a soft row's weight.
         seconds: DAQP looks at the clock at every 32nd change of the active set, and gives up after these.
     """
-    limit = 0.0 if seconds is None else max(seconds, 1e-9)
-    u, _, flag, info = daqp.solve(
-        None,
-        None,
-        matrix,
-        high,
-        low,
-        marks,
-        rho_soft=SLACK,
-        iter_limit=_ITERATIONS,
-        primal_tol=_TOLERANCE,
-        time_limit=limit,
-    )
+    model = daqp.Model()
+    model.settings = _SETTINGS if seconds is None else _SETTINGS | {"time_limit": max(seconds, 1e-9)}
+    count = matrix.shape[1]
+    ready, _ = model.setup(_identity(count), _nothing(count), matrix, high, low, marks)
+    if ready < 0:
+        return Answer(np.zeros(count), _status(ready, np.zeros(count)), 0)
+    model.soft_weights(slack, slack)
+    u, _, flag, info = model.solve()
     return Answer(u, _status(flag, u), info["iterations"])
+
+
+@lru_cache
+def _identity(count: int) -> Float[np.ndarray, "count count"]:
+    return np.eye(count)
+
+
+@lru_cache
+def _nothing(count: int) -> Float[np.ndarray, " count"]:
+    return np.zeros(count)
 
 
 def _status(flag: int, u: Float[np.ndarray, " unknowns"]) -> Status:
