@@ -26,5 +26,6 @@ def load_humanoid(spec: str, config: Path | None = None) -> Humanoid:
     from toddle.robots.humanoids.infer import humanoid
 
     path, settings = configuration.found(spec, config)
-    where = str(path) if config is None else f"{config} on {path.name}"
-    return humanoid(read(path, settings.base, settings.without), settings, where)
+    said = config or (Path(spec) if Path(spec).suffix.lower() == ".toml" else None)
+    where = str(path) if said is None else f"{said} on {path.name}"
+    return humanoid(read(path, settings.base, settings.without, where), settings, where)

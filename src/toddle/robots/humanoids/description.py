@@ -17,21 +17,22 @@ from toddle.robots.humanoids.urdf import LEAST_MASS, ready
 from toddle.robots.markup import parse, read_bytes
 
 
-def read(path: Path, base: str | None = None, without: Sequence[str] = ()) -> Skeleton:
+def read(path: Path, base: str | None = None, without: Sequence[str] = (), where: str | None = None) -> Skeleton:
     """The whole robot of a URDF or MJCF file.
 
     Args:
         path: the file.
         base: link that floats; what is above it is left out. None: the one that does, or the root.
         without: links that are left out, with all that hangs on them.
+        where: whatever names base and without, for messages; None: the file.
 
     Raises:
         BadInput: the file can't be used; the line says which element and what mends it.
     """
     root = parse(read_bytes(path), str(path))
     if root.tag == "robot":
-        told = ready(root, path, base, without)
-        skeleton = _skeleton(_compiled(mujoco.MjSpec.from_string, told.text, path), None, path)
+        told = ready(root, path, base, without, where or str(path))
+        skeleton = _skeleton(_compiled(mujoco.MjSpec.from_string, told.text, path), None, str(path))
         return tuple(
             replace(
                 link,
@@ -41,11 +42,11 @@ def read(path: Path, base: str | None = None, without: Sequence[str] = ()) -> Sk
             for link in skeleton
         )
     if root.tag == "mujoco":
-        skeleton = _skeleton(_compiled(mujoco.MjSpec.from_file, str(path), path), base, path)
+        skeleton = _skeleton(_compiled(mujoco.MjSpec.from_file, str(path), path), base, where or str(path))
         known = [link.name for link in skeleton]
         for name in without:
             if name not in known:
-                raise unknown_name("body", name, known, where=f"{path}: without")
+                raise unknown_name("body", name, known, where=f"{where or path}: without")
         return _pruned(skeleton, without)
     raise BadInput(f"its root element is <{root.tag}>", where=str(path), remedy="name a URDF or MJCF file")
 
@@ -58,8 +59,8 @@ def _compiled(parser: Any, source: str, path: Path) -> Any:
         model = spec.compile()
     except ValueError as error:
         raise BadInput(f"MuJoCo can't read it: {error}", where=str(path), remedy="mend that element") from None
-    loops = (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD)
-    if any(kind in loops for kind in model.eq_type):
+    loops = int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)
+    if any(int(kind) in loops for kind in model.eq_type):
         raise BadInput(
             "its chains are closed by <equality> constraints",
             where=str(path),
@@ -79,12 +80,12 @@ def _pruned(skeleton: Skeleton, without: Sequence[str]) -> Skeleton:
     return tuple(kept)
 
 
-def _skeleton(model: Any, base: str | None, path: Path) -> Skeleton:
+def _skeleton(model: Any, base: str | None, where: str) -> Skeleton:
     names = [model.body(body).name for body in range(model.nbody)]
     if base is not None and base not in names[1:]:
-        raise unknown_name("body", base, [name for name in names[1:] if name], where=f"{path}: base")
+        raise unknown_name("body", base, [name for name in names[1:] if name], where=f"{where}: base")
     if model.nbody < 2:
-        raise BadInput("it has no body", where=str(path), remedy="name the description of a robot")
+        raise BadInput("it has no body", where=where, remedy="name the description of a robot")
     root = _root(model) if base is None else names.index(base)
     index = {root: 0}
     for body in range(root + 1, model.nbody):
@@ -123,11 +124,11 @@ def _link(model: Any, body: int, parent: int) -> Link:
 def _others(model: Any, body: int) -> tuple[str, ...]:
     """Names of the body's joints that are no hinges, but for what makes it float."""
     first = int(model.body_jntadr[body])
-    kinds = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_BALL
+    kinds = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_BALL)
     return tuple(
         model.joint(joint).name or f"joint{joint}"
         for joint in range(first, first + int(model.body_jntnum[body]))
-        if model.jnt_type[joint] in kinds
+        if int(model.jnt_type[joint]) in kinds
     )
 
 

@@ -89,6 +89,7 @@ def _trimmed(skeleton: Skeleton, settings: Settings, where: str, notes: list[str
                 raise unknown_name("joint", name, known, where=f"{where}: {key}")
     rest = weld(skeleton, [name for name in known if name not in settings.welded])
     legs = find_legs(rest, (settings.left_foot, settings.right_foot), where)
+    _check_hinges(skeleton, [rest[foot].name for foot in legs.feet], rest[legs.fork].name, where)
     needed = {link for chain in legs.chains for link in chain} | _spine(rest, legs)
     weights = [link.mass for link in rest]
     for link in range(len(rest) - 1, 0, -1):
@@ -110,6 +111,21 @@ def _trimmed(skeleton: Skeleton, settings: Settings, where: str, notes: list[str
     if others:
         notes.append(f"welded at zero, for they are no hinges: {', '.join(others)}")
     return weld(skeleton, keep)
+
+
+def _check_hinges(skeleton: Skeleton, feet: list[str], fork: str, where: str) -> None:
+    """Refuses legs with joints that slide or are balls, which were held until here."""
+    names = [link.name for link in skeleton]
+    for foot in feet:
+        link = skeleton[names.index(foot)]
+        while link.name != fork and link.parent >= 0:
+            if link.others:
+                raise BadInput(
+                    f"the leg's joint {link.others[0]!r} is no hinge",
+                    where=where,
+                    remedy="only legs whose joints turn can walk",
+                )
+            link = skeleton[link.parent]
 
 
 def _spine(body: Skeleton, legs: Legs) -> set[int]:

@@ -98,12 +98,6 @@ def _checked(skeleton: Skeleton, legs: Legs, where: str) -> Legs:
         )
     for chain in legs.chains:
         for link in chain:
-            if skeleton[link].others:
-                raise BadInput(
-                    f"the leg's joint {skeleton[link].others[0]!r} is no hinge",
-                    where=where,
-                    remedy="only legs whose joints turn are walked with",
-                )
             for hinge in skeleton[link].hinges:
                 if not hinge.lower < hinge.upper < np.inf or hinge.lower == -np.inf:
                     raise BadInput(

@@ -122,5 +122,5 @@ def _transform(element: Element) -> Float[np.ndarray, "4 4"]:
     else:
         axis, angle = numbers[:3] / np.linalg.norm(numbers[:3]), np.deg2rad(numbers[3])
         cross = np.cross(np.eye(3), axis)
-        found[:3, :3] = np.eye(3) - np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+        found[:3, :3] = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
     return found

@@ -147,9 +147,9 @@ def _gait(
         said["com_height"] = bent
         notes.append(f"com_height, with hips, knees and ankles bent by 0.4, 0.8 and 0.4 rad: {bent:.3f} m")
     distance, height = said["foot_distance"], said["com_height"]
-    if distance > _WIDEST * height or height <= 0:
+    if distance > _WIDEST * max(height, bent):
         raise BadInput(
-            f"its feet would be {distance:.2f} m apart under a centre of mass {height:.2f} m high",
+            f"its feet would be {distance:.2f} m apart under a centre of mass {max(height, bent):.2f} m high",
             where=where,
             remedy="name the feet with left_foot and right_foot, or give foot_distance and com_height",
         )
@@ -196,12 +196,14 @@ def _shrunk(model: Any, gait: Gait, bends: Legs3, home: Float[np.ndarray, " posi
     """The gait with its hull drawn together, around where the foot stands, until the legs can span it."""
     whole = np.array(gait.hull)
     middle = np.array([0.0, gait.foot_distance])
-    for percent in range(100, 30, -5):
+    percent = 100
+    while percent > 30:
         corners = middle + percent / 100 * (whole - middle)
         gait = replace(gait, hull=tuple((float(x), float(y)) for x, y in corners))
         asked, longest = _reach(model, gait, bends, home)
         if asked.max() <= longest:
             break
+        percent -= 5
     if percent < 100:
         notes.append(f"hull drawn together to {percent} %, which the legs can span")
     return gait

@@ -41,7 +41,7 @@ class Ready(NamedTuple):
     weightless: frozenset[str]
 
 
-def ready(root: Element, path: Path, base: str | None, without: Sequence[str]) -> Ready:
+def ready(root: Element, path: Path, base: str | None, without: Sequence[str], where: str) -> Ready:
     """The robot of a URDF's root element, for MuJoCo.
 
     Args:
@@ -49,16 +49,18 @@ def ready(root: Element, path: Path, base: str | None, without: Sequence[str]) -
         path: the file, for its meshes and for messages.
         base: link that floats; what is above it is left out. None: the root of the tree.
         without: links that are left out, with all that hangs on them.
+        where: whatever names base and without, for messages.
 
     Raises:
         BadInput: the file can't be used; the line says which element and what mends it.
     """
-    links = {_name(link, path): link for link in root.findall("link")}
-    joints = {_end(joint, "child", links, path): joint for joint in root.findall("joint")}
+    links = _once([(_name(link, path), link) for link in root.findall("link")], "is there twice", path)
+    children = [(_end(joint, "child", links, path), joint) for joint in root.findall("joint")]
+    joints = _once(children, "is the child of two joints", path)
     above = {child: _end(joint, "parent", links, path) for child, joint in joints.items()}
     for joint in joints.values():
         _check_limits(joint, path)
-    kept = _kept(links, above, _base(links, above, base, path), without, path)
+    kept = _kept(links, above, _base(links, above, base, path, where), without, where)
     robot = Element("robot", name=root.get("name") or path.stem)
     _compiler(robot)
     clouds: dict[str, tuple[Shape, ...]] = {}
@@ -79,6 +81,15 @@ def _name(element: Element, path: Path) -> str:
     if not name:
         raise BadInput(f"a <{element.tag}> has no name", where=str(path), remedy="give it a name")
     return name
+
+
+def _once(named: list[tuple[str, Element]], fault: str, path: Path) -> dict[str, Element]:
+    found: dict[str, Element] = {}
+    for name, element in named:
+        if name in found:
+            raise BadInput(f"the link {name!r} {fault}", where=str(path), remedy="a robot is a tree: keep one of them")
+        found[name] = element
+    return found
 
 
 def _end(joint: Element, tag: str, links: dict[str, Element], path: Path) -> str:
@@ -104,10 +115,10 @@ def _check_limits(joint: Element, path: Path) -> None:
         raise BadInput(f"lower {lower:g} is above upper {upper:g}", where=where, remedy="exchange them")
 
 
-def _base(links: dict[str, Element], above: dict[str, str], base: str | None, path: Path) -> str:
+def _base(links: dict[str, Element], above: dict[str, str], base: str | None, path: Path, where: str) -> str:
     if base is not None:
         if base not in links:
-            raise unknown_name("link", base, links, where=f"{path}: base")
+            raise unknown_name("link", base, links, where=f"{where}: base")
         return base
     roots = [name for name in links if name not in above]
     if len(roots) != 1:
@@ -117,17 +128,24 @@ def _base(links: dict[str, Element], above: dict[str, str], base: str | None, pa
             remedy="join all links into one tree, or name the link that floats with base",
         )
     root = roots[0]
+    for name in links:
+        chain = {name}
+        while name in above:
+            name = above[name]
+            if name in chain:
+                raise BadInput(f"its joints form a circle at {name!r}", where=str(path), remedy="make them a tree")
+            chain.add(name)
     children = [child for child, parent in above.items() if parent == root]
     if root == "world" and len(children) == 1 and links[root].find("inertial") is None:
         return children[0]
     return root
 
 
-def _kept(links: dict[str, Element], above: dict[str, str], base: str, without: Sequence[str], path: Path) -> list[str]:
+def _kept(links: dict[str, Element], above: dict[str, str], base: str, without: Sequence[str], where: str) -> list[str]:
     """The base and every link under it, the base first."""
     for name in without:
         if name not in links:
-            raise unknown_name("link", name, links, where=f"{path}: without")
+            raise unknown_name("link", name, links, where=f"{where}: without")
     below: dict[str, list[str]] = {}
     for child, parent in above.items():
         below.setdefault(parent, []).append(child)
@@ -137,8 +155,6 @@ def _kept(links: dict[str, Element], above: dict[str, str], base: str, without: 
         if name in without:
             continue
         kept.append(name)
-        if len(kept) > len(links):
-            raise BadInput("its joints form a circle", where=str(path), remedy="make them a tree")
         front += below.get(name, [])
     return kept
 
