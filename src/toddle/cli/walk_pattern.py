@@ -37,6 +37,7 @@ def make_pattern(asked: Walk) -> int:
     tell_capped(task, through, spec)
     folder = new_folder(asked.out, f"walk-{Path(spec).stem}")
     allowed: list[Velocity] = []
+    _ = pattern.step(pattern.start(), task.legs[0].velocity, task.circles)  # compiled, before the clock runs
     began = time.perf_counter()
     command = _command(task, gait, through, allowed)
     trajectory = walk_pattern(pattern, gait, command, _iterations(asked, task, gait), task.circles)

@@ -6,8 +6,9 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from toddle.cli.run_folder import new_folder
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from toddle.cli.walk import Task, Walk
     from toddle.outside.simulation.disturbances import WorldOptions
     from toddle.outside.simulation.humanoid import HumanoidSimulation
-    from toddle.outside.simulation.pictures import Camera
     from toddle.outside.teleoperation.keys import Keyboard
     from toddle.outside.walk_run import Watch
     from toddle.robots.gait import Gait
@@ -33,7 +33,6 @@ def walk_in_physics(asked: Walk) -> int:
     """Walk, leave a folder, tell the figures; returns the exit code."""
     from toddle.cli.walk import DEFAULT_ROBOT, task_of, tell_capped
     from toddle.outside.simulation.humanoid import HumanoidSimulation
-    from toddle.outside.video import Film
     from toddle.outside.walk_figures import figures_of
     from toddle.outside.walk_record import Recorder
     from toddle.outside.walk_run import Watch, warm_up
@@ -52,11 +51,10 @@ def walk_in_physics(asked: Walk) -> int:
     folder = new_folder(asked.out, f"walk-{humanoid.name}")
     warm_up(walks, simulation)
     recorder = Recorder()
-    watch, camera = Watch(recorder, simulation), _camera(asked, simulation)
-    with Film(folder / "walk.mp4") as film:
-        picture = None if camera is None else lambda: film.add(camera.picture())
+    watch = Watch(recorder, simulation)
+    with _filming(asked, simulation, folder) as film:
         try:
-            until, stopped = _walk(task, walks, simulation, watch, picture)
+            until, stopped = _walk(task, walks, simulation, watch, film)
         except Exception:
             write_trajectory(folder / "trajectory.parquet", recorder.record())
             raise
@@ -83,7 +81,7 @@ def _capped(gait: Gait) -> Callable[[Velocity], Velocity]:
 
 
 def _walk(
-    task: Task, walks: Walker, simulation: HumanoidSimulation, watch: Watch, film: Callable[[], None] | None
+    task: Task, walks: Walker, simulation: HumanoidSimulation, watch: Watch, film: Callable[[float], None]
 ) -> tuple[float, bool]:
     """Walk to the end: until when it was commanded [s], and whether somebody interrupted it."""
     from toddle.outside.teleoperation.commands import follow, until
@@ -136,11 +134,11 @@ def _shown(stack: ExitStack, task: Task, walks: Walker, keyboard: Keyboard | Non
     if keyboard is not None:
         panel = stack.enter_context(Panel(f"{name} walks", HELP))
         return _Telling(panel).tell
-    reporter = stack.enter_context(Reporter(f"{name} walks", math.ceil(task.seconds)))
+    total = math.ceil(task.seconds)
+    reporter = stack.enter_context(Reporter(f"{name} walks, seconds", total))
 
     def tell_bar(moment: Moment) -> None:
-        seconds = min(int(moment.t), math.ceil(task.seconds))
-        reporter.tell(seconds, f"s, ZMP margin {100 * moment.measured.margin:.1f} cm")
+        reporter.tell(min(int(moment.t), total - 1), f"ZMP margin {100 * moment.measured.margin:.1f} cm")
 
     return tell_bar
 
@@ -169,17 +167,20 @@ class _Telling:
         )  # fmt: skip
 
 
-def _camera(asked: Walk, simulation: HumanoidSimulation) -> Camera | None:
+def _filming(
+    asked: Walk, simulation: HumanoidSimulation, folder: Path
+) -> AbstractContextManager[Callable[[float], None]]:
     """What films, where there is something to draw with; otherwise a line says so."""
-    from toddle.outside.simulation.pictures import Camera
+    from toddle.outside.walk_run import Filming
 
+    nothing = nullcontext(lambda _: None)
     if asked.video is False or (asked.video is None and asked.keys):
-        return None
+        return nothing
     try:
-        return Camera(simulation)
+        return Filming(simulation, folder / "walk.mp4", full=asked.video is True)
     except ToddleError as fault:
         print(f"toddle: no film: {fault.line}", file=sys.stderr)
-        return None
+        return nothing
 
 
 def _world(asked: Walk, task: Task) -> WorldOptions:

@@ -13,15 +13,14 @@ from jaxtyping import UInt8
 
 from toddle.failures import ToddleError
 
-FRAMES = 25
-"""Pictures a second."""
-
 
 class Film:
     """Writes pictures of one size to an MP4 (H.264); nothing lies under its name before it is closed."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, rate: int) -> None:
+        """Write to ``path``, so many pictures a second."""
         self._path, self._part = path, path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+        self._rate = rate
         self._writer: Generator[Any, Any, None] | None = None
         self._size: tuple[int, ...] = ()
         self.pictures = 0
@@ -79,7 +78,7 @@ class Film:
 
         height, width = self._size[:2]
         writer = imageio_ffmpeg.write_frames(
-            str(self._part), (width, height), fps=FRAMES, codec="libx264", quality=7, macro_block_size=2,
+            str(self._part), (width, height), fps=self._rate, codec="libx264", quality=7, macro_block_size=2,
             ffmpeg_log_level="error",
         )  # fmt: skip
         writer.send(None)

@@ -32,7 +32,7 @@ def figures_of(record: Record, gait: Gait, *, until: float, wall: float) -> dict
     """
     seconds = float(record.t[-1]) if len(record.t) else 0.0
     speed, turning = velocity_errors(record, gait, until)
-    true_speed, true_turning = true_errors(record, until)
+    true_speed, true_turning = true_errors(record, gait, until)
     distance = zmp_distance(record)
     plans = Counter(record.plan_status)
     return {
@@ -54,7 +54,7 @@ def figures_of(record: Record, gait: Gait, *, until: float, wall: float) -> dict
     }
 
 
-def window(record: Record, until: float) -> Bool[np.ndarray, " ticks"] | None:
+def window(record: Record, gait: Gait, until: float) -> Bool[np.ndarray, " ticks"] | None:
     """The ticks in which the command was steady, settling left out; None where there are too few.
 
     The command is what the safety gate let through.
@@ -62,7 +62,7 @@ def window(record: Record, until: float) -> Bool[np.ndarray, " ticks"] | None:
     began = max(SETTLING, until - STEADY)
     within = (record.t >= began) & (record.t < until)
     allowed = record.allowed[within]
-    if until - began < _SHORTEST or not within.any() or np.ptp(allowed, axis=0).max() > 1e-9:
+    if until - began < max(_SHORTEST, 2.1 * gait.step_time) or not within.any() or np.ptp(allowed, axis=0).max() > 1e-9:
         return None
     return within
 
@@ -72,28 +72,27 @@ def velocity_errors(record: Record, gait: Gait, until: float) -> tuple[float | N
 
     A pattern without a body is measured by its own centre of mass.
     """
-    within = window(record, until)
+    within = window(record, gait, until)
     if within is None:
         return None, None
     if record.measured is not None:
         achieved = np.nan_to_num(record.measured.velocity[within]).mean(axis=0)
     else:
-        times, place = record.t[within], _planned_place(record)[within]
-        strides = times <= times[0] + _stride(gait) * ((times[-1] - times[0]) // _stride(gait)) + 1e-9
-        achieved = _mean_velocity(times[strides], place[strides])
+        place = np.column_stack([record.com[within, 0, :2], record.yaw[within, 0]])
+        achieved = mean_velocity(record.t[within], place, 2 * gait.step_time)
     return _against(achieved, record.allowed[within][-1])
 
 
-def true_errors(record: Record, until: float) -> tuple[float | None, float | None]:
+def true_errors(record: Record, gait: Gait, until: float) -> tuple[float | None, float | None]:
     """The same by where the simulator's waist really went."""
-    within = window(record, until)
+    within = window(record, gait, until)
     if within is None or record.true is None:
         return None, None
     times = record.t[within]
     seen = TrueRecord(*(values[(record.true.t >= times[0]) & (record.true.t <= times[-1])] for values in record.true))
-    if len(seen.t) < 2:
+    if len(seen.t) < 2 or seen.t[-1] - seen.t[0] < 2 * gait.step_time:
         return None, None
-    return _against(_mean_velocity(seen.t, seen.waist), record.allowed[within][-1])
+    return _against(mean_velocity(seen.t, seen.waist, 2 * gait.step_time), record.allowed[within][-1])
 
 
 def zmp_distance(record: Record) -> Float[np.ndarray, " ticks"]:
@@ -111,27 +110,33 @@ def distance_walked(record: Record, gait: Gait) -> float:
     if record.measured is not None:
         speed = np.hypot(*np.nan_to_num(record.measured.velocity[1:, :2]).T)
         return float(np.sum(speed * np.diff(record.t)))
-    each = max(round(_stride(gait) / (record.t[1] - record.t[0])), 1)
+    each = max(round(2 * gait.step_time / (record.t[1] - record.t[0])), 1)
     return float(np.sum(np.hypot(*np.diff(record.com[::each, 0, :2], axis=0).T)))
 
 
-def _stride(gait: Gait) -> float:
-    """Two steps, after which the sway begins anew [s]."""
-    return 2 * gait.step_time
+def mean_velocity(
+    t: Float[np.ndarray, " looks"], place: Float[np.ndarray, "looks 3"], stride: float
+) -> Float[np.ndarray, "3"]:
+    """Of x, y, yaw over time, in the frame of the body [m/s, m/s, rad/s], without the sway of its steps.
 
-
-def _planned_place(record: Record) -> Float[np.ndarray, "ticks 3"]:
-    return np.column_stack([record.com[:, 0, :2], record.yaw[:, 0]])
-
-
-def _mean_velocity(t: Float[np.ndarray, " looks"], place: Float[np.ndarray, "looks 3"]) -> Float[np.ndarray, "3"]:
-    """Of x, y, yaw over time, in the frame of the body itself [m/s, m/s, rad/s]; the sway averages out."""
-    yaw = np.unwrap(place[:, 2])
-    middle = (yaw[1:] + yaw[:-1]) / 2
-    x, y = np.diff(place[:, :2], axis=0).T
-    ahead = np.cos(middle) * x + np.sin(middle) * y
-    aside = np.cos(middle) * y - np.sin(middle) * x
-    return np.array([ahead.sum(), aside.sum(), yaw[-1] - yaw[0]]) / (t[-1] - t[0])
+    The heading is the mean yaw over a stride of two steps [s]. As many whole strides as there are count, weighted by a
+    Hann window where they are two or more: what sways averages out though strides are not all alike.
+    """
+    strides = int((t[-1] - t[0]) / stride + 1e-6)
+    t = t[t <= t[0] + strides * stride + 1e-6]
+    place = place[: len(t)]
+    yaw, middle = np.unwrap(place[:, 2]), (t[1:] + t[:-1]) / 2
+    grown = np.concatenate([[0.0], np.cumsum((yaw[1:] + yaw[:-1]) / 2 * np.diff(t))])
+    low, high = np.maximum(middle - stride / 2, t[0]), np.minimum(middle + stride / 2, t[-1])
+    heading = (np.interp(high, t, grown) - np.interp(low, t, grown)) / (high - low)
+    dx, dy = np.diff(place[:, :2], axis=0).T / np.diff(t)
+    ahead = np.cos(heading) * dx + np.sin(heading) * dy
+    aside = np.cos(heading) * dy - np.sin(heading) * dx
+    weight = np.diff(t)
+    if strides > 1:
+        weight = weight * np.sin(np.pi * (middle - t[0]) / (t[-1] - t[0])) ** 2
+    rates = np.stack([ahead, aside, np.diff(yaw) / np.diff(t)])
+    return rates @ weight / weight.sum()
 
 
 def _against(achieved: Float[np.ndarray, "3"], asked: Float[np.ndarray, "3"]) -> tuple[float | None, float | None]:

@@ -23,6 +23,7 @@ from toddle.robots.gait import Gait
 from toddle.signals import Circle, Footstep
 
 LEFT_INK, RIGHT_INK = "#2a7f62", "#8a5fb0"
+_SMALL_YAW = 0.05  # not to be magnified [rad]
 _POINTS = 4000  # a line has no more
 
 
@@ -101,7 +102,7 @@ def footprints(path: Path, record: Record, gait: Gait, circles: Sequence[Circle]
     low, high = reach.min(axis=0) - 0.08, reach.max(axis=0) + 0.08
     axes.set(xlabel="x [m]", ylabel="y [m]", title=title, xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     axes.set_aspect("equal")
-    axes.legend(frameon=False, ncols=4, loc="upper center", bbox_to_anchor=(0.5, -0.16), fontsize=9)
+    figure.legend(frameon=False, ncols=4, loc="outside lower center", fontsize=9)
     save_figure(figure, path)
 
 
@@ -119,6 +120,8 @@ def feet_over_time(path: Path, record: Record, *, title: str) -> None:
         if column < 2:
             com = _thin(record.com[:, 0, column])
             axes.plot(_thin(record.t), com, color=OURS, lw=0.9, ls="--", label="centre of mass")
+    low, high = rows[3].get_ylim()
+    rows[3].set_ylim(min(low, -_SMALL_YAW), max(high, _SMALL_YAW))
     rows[0].legend(frameon=False, ncols=5, fontsize=8, loc="upper left")
     save_figure(figure, path)
 

@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from itertools import islice
+from pathlib import Path
 
 from toddle.outside.simulation.disturbances import TICK
 from toddle.outside.simulation.humanoid import HumanoidSimulation
+from toddle.outside.simulation.pictures import Camera
 from toddle.outside.teleoperation.commands import Source, follow
-from toddle.outside.video import FRAMES
+from toddle.outside.video import Film
 from toddle.outside.walk_record import Recorder
 from toddle.signals import Velocity
 from toddle.walk.loop import Moment, walk
 from toddle.walk.scenarios import Leg
 from toddle.walk.walker import Walker
 
-FILMED = 60.0
-"""A film holds so much of the beginning of a walk [s]."""
+_FRAMES, _FRAMES_SLOW = 25, 12  # pictures a second
+_BEGINNING = 20.0  # of a walk [s]
+_QUICK = 0.02  # for a picture [s]; where it takes longer, no graphics card draws
+_LARGE, _SMALL = (960, 540), (640, 360)  # pixels
 
 _LOOK = 10  # ticks between two looks at the truth
-_FRAME = round(1 / (FRAMES * TICK))  # ticks between two pictures
 _WARM = 130  # ticks, in which everything is called once
 
 
@@ -40,7 +44,7 @@ class Watch:
         moments: Iterator[Moment],
         *,
         tell: Callable[[Moment], None],
-        film: Callable[[], None] | None = None,
+        film: Callable[[float], None] = lambda _: None,
         real_time: Callable[[], bool] = lambda: False,
     ) -> None:
         """Watch a walk to its end.
@@ -48,7 +52,7 @@ class Watch:
         Args:
             moments: the walk.
             tell: is told of each moment.
-            film: takes a picture, called `FRAMES` times a simulated second.
+            film: takes a picture, if it is time.
             real_time: whether to wait for the clock.
         """
         began = last = time.perf_counter()
@@ -57,12 +61,52 @@ class Watch:
             self._recorder.add(moment)
             if number % _LOOK == 0:
                 self._recorder.add_truth(moment.t, self._simulation.truth().waist)
-            if film is not None and number % _FRAME == 0 and moment.t <= FILMED:
-                film()
+            film(moment.t)
             tell(moment)
             if real_time():
                 time.sleep(max(began + moment.t - time.perf_counter(), 0.0))
             last = time.perf_counter()
+
+
+class Filming:
+    """Films a simulation: all of it in full, or, where nobody asked, its beginning as fast as can be drawn.
+
+    Within ``with``; afterwards the film lies under its name, or nothing does.
+    """
+
+    def __init__(self, simulation: HumanoidSimulation, path: Path, *, full: bool) -> None:
+        """Try out how fast pictures come.
+
+        Raises:
+            ToddleError: nothing here can draw.
+        """
+        self._camera = Camera(simulation, *_LARGE)
+        _ = self._camera.picture()  # the first one takes longer
+        began = time.perf_counter()
+        _ = self._camera.picture()
+        slow = not full and time.perf_counter() - began > _QUICK
+        if slow:
+            self._camera.close()
+            self._camera = Camera(simulation, *_SMALL, shadows=False)
+        rate = _FRAMES_SLOW if slow else _FRAMES
+        self._between, self._until = 1 / rate, math.inf if full else _BEGINNING
+        self._film, self._next = Film(path, rate), 0.0
+
+    def __enter__(self) -> Filming:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self._camera.close()
+        if kind is None:
+            self._film.close()
+        else:
+            self._film.drop()
+
+    def __call__(self, t: float) -> None:
+        """Take a picture, if it is time [s] for one."""
+        if self._next <= t + TICK / 2 and t <= self._until:
+            self._next += self._between
+            self._film.add(self._camera.picture())
 
 
 def warm_up(walker: Walker, simulation: HumanoidSimulation) -> None:

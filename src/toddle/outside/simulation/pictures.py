@@ -33,7 +33,15 @@ _THICK = 0.0008  # of a footprint [m]
 class Camera:
     """Draws one simulation, picture by picture."""
 
-    def __init__(self, simulation: HumanoidSimulation, width: int = 640, height: int = 360, view: str = "side") -> None:
+    def __init__(
+        self,
+        simulation: HumanoidSimulation,
+        width: int = 640,
+        height: int = 360,
+        view: str = "side",
+        *,
+        shadows: bool = True,
+    ) -> None:
         """Opens what draws.
 
         Args:
@@ -41,6 +49,7 @@ class Camera:
             width: of the pictures [pixels], up to 1920.
             height: of the pictures [pixels], up to 1080.
             view: one of `VIEWS`, or a camera of the robot's (left_eye, right_eye).
+            shadows: whether there are any; they take most of the time where no graphics card draws.
 
         Raises:
             BadInput: there is no such view, or the size is out of range.
@@ -54,6 +63,7 @@ class Camera:
         self._size = mujoco.MjrRect(0, 0, width, height)
         self._camera = _camera(simulation, view)
         self._scene = mujoco.MjvScene(simulation.model, maxgeom=_GEOMS)
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW.value] = shadows
         self._options, self._mouse = mujoco.MjvOption(), mujoco.MjvPerturb()
         self._gl, self._context = _drawing(simulation.model, width, height)
 
