@@ -74,6 +74,18 @@ def test_its_home_stands_in_mujoco(tmp_path: Path, order: Order) -> None:
     assert min(knees) > 0.3
 
 
+def test_stiff_ankles_stand_straighter(tmp_path: Path) -> None:
+    robot = urdf(Order())
+    for joint in robot.findall("joint"):
+        if "ankle_pitch" in joint.get("name", ""):
+            joint.findall("limit")[0].set("lower", "-0.3")
+    file = tmp_path / "stiff.urdf"
+    file.write_text(text(robot))
+    stiff = load_humanoid(str(file))
+    assert stiff.gait.com_height > load(tmp_path, Order()).gait.com_height + 0.005
+    assert (stiff.home[7:] >= stiff.lower).all()
+
+
 def test_what_was_inferred_is_said(tmp_path: Path) -> None:
     notes = "\n".join(load(tmp_path, Order(names=("one", "two"))).notes)
     for part in ("soles", "foot_distance", "com_height", "step_time", "hull", "stiffness", "imu", "toes"):

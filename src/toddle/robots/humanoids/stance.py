@@ -17,7 +17,7 @@ from toddle.failures import BadInput
 from toddle.robots.gait import Gait
 from toddle.robots.humanoid import LEFT, RIGHT
 from toddle.robots.humanoids.description import quaternion
-from toddle.robots.humanoids.home import stand
+from toddle.robots.humanoids.home import Stand, stand
 from toddle.robots.humanoids.limbs import Legs
 from toddle.robots.humanoids.settings import GAIT_KEYS, Settings
 from toddle.robots.humanoids.skeleton import Hinge, Skeleton, hinges, poses
@@ -30,6 +30,7 @@ _LEFTWARD = 0.8  # cosine; an axis nearer to the left one bends the leg forwards
 _CLOSE = 1e-6  # [m, rad]
 _CLOSE_FIVE = 2e-3  # without an ankle roll, both soles are only that flat [m, rad]
 _WIDEST = 0.8  # feet further apart than that share of the centre of mass' height are no feet
+_STRETCHES = (0.0, 0.25, 0.5, 0.75, -0.5, -1.0)  # heights tried where none is given: 0 bent legs, 1 straight ones
 _MARGIN = (0.1, 0.2)  # of the sole's length and width
 
 Legs3 = tuple[tuple[tuple[int, Hinge, float], ...], ...]
@@ -72,25 +73,48 @@ def stance(
     joints = hinges(body)
     straight = _configuration(joints, axes, ())
     bent = _configuration(joints, axes, bends)
-    gait = _gait(settings, sole, axes, ankles, _height(model, bent), where, notes)
-    height, distance = gait.com_height, gait.foot_distance
-    soles = np.array([[0.0, distance / 2, 0.0], [0.0, -distance / 2, 0.0]])
-    start = bent.copy()
-    start[2] = height
     walking = {hinge.name for chain in legs.chains for link in chain for hinge in body[link].hinges}
     free = [number for number, hinge in enumerate(joints) if hinge.name in walking]
-    found = stand(model, start, free, np.array([0.0, 0.0, height]), soles)
-    if found.residual > (_CLOSE if len(free) == 12 else _CLOSE_FIVE):
+    close = _CLOSE if len(free) == 12 else _CLOSE_FIVE
+    known = settings.com_height is not None or settings.gait is not None
+    low, high = _height(model, bent), _height(model, straight)
+    tried = list(_STRETCHES)
+    while True:
+        said: list[str] = []
+        guess = low + tried.pop(0) * (high - low)
+        gait = _gait(settings, sole, axes, ankles, guess, where, said)
+        found = _standing(model, bent, free, gait)
+        if found.residual <= close or known or not tried:
+            break
+    notes += said
+    if found.residual > close:
         raise BadInput(
-            f"with its centre of mass {height:.3f} m high and its feet {distance:.3f} m apart it can't stand flat",
+            f"with its centre of mass {gait.com_height:.3f} m high and its feet {gait.foot_distance:.3f} m apart "
+            "it can't stand flat",
             where=f"{where}: com_height",
-            remedy=f"with straight legs it is {_height(model, straight):.3f} m high, with bent ones "
-            f"{_height(model, bent):.3f} m: give com_height in between, and foot_distance near the hips' width",
+            remedy=f"with straight legs it is {high:.3f} m high, with bent ones {low:.3f} m: give com_height in "
+            f"between, and foot_distance near the hips' width{_stuck(joints, found.q)}",
         )
     if settings.hull is None and settings.gait is None:
         gait = _shrunk(model, gait, bends, found.q, notes)
     _check_hull(model, gait, bends, found.q, where)
     return gait, found.q
+
+
+def _stuck(joints: tuple[Hinge, ...], q: Float[np.ndarray, " positions"]) -> str:
+    """Names the joints that are at their limits, and bind."""
+    bent = zip(joints, q[7:], strict=True)
+    found = [hinge.name for hinge, angle in bent if not hinge.lower < angle < hinge.upper]
+    return f" (at their limits: {', '.join(found[:6])})" if found else ""
+
+
+def _standing(model: Any, bent: Float[np.ndarray, " positions"], free: list[int], gait: Gait) -> Stand:
+    """The posture in which the gait begins."""
+    half = gait.foot_distance / 2
+    start = bent.copy()
+    start[2] = gait.com_height
+    com = np.array([0.0, 0.0, gait.com_height])
+    return stand(model, start, free, com, np.array([[0.0, half, 0.0], [0.0, -half, 0.0]]))
 
 
 def _bends(
@@ -145,7 +169,7 @@ def _gait(
         notes.append(f"foot_distance, from the zero posture: {said['foot_distance']:.3f} m")
     if "com_height" not in said:
         said["com_height"] = bent
-        notes.append(f"com_height, with hips, knees and ankles bent by 0.4, 0.8 and 0.4 rad: {bent:.3f} m")
+        notes.append(f"com_height, with hips, knees and ankles bent by about 0.4, 0.8 and 0.4 rad: {bent:.3f} m")
     distance, height = said["foot_distance"], said["com_height"]
     if distance > _WIDEST * max(height, bent):
         raise BadInput(
