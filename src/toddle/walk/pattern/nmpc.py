@@ -23,7 +23,7 @@ import numpy as np
 from jaxtyping import Float
 
 from toddle.robots.gait import Gait
-from toddle.robots.humanoid import LEFT
+from toddle.robots.humanoid import LEFT, RIGHT
 from toddle.signals import Footstep, Velocity
 from toddle.walk.pattern.displacement import Pair, displacements
 from toddle.walk.pattern.feasible import landing_hull, widening
@@ -206,7 +206,17 @@ def nmpc(gait: Gait, weights: Weights | None = None, *, freeze: float = 0.06, bo
         end_inner=float((inner - outer / growth) / (1 - growth**-2)),
         end_outer=float((outer - inner / growth) / (1 - growth**-2)),
     )
-    return Nmpc(gait, weights, tables, numbers, freeze)
+    problem = Nmpc(gait, weights, tables, numbers, freeze)
+    _warm_up(problem)
+    return problem
+
+
+def _warm_up(problem: Nmpc) -> None:
+    """Compiles, or loads what was compiled: else the first iteration would be late by a second."""
+    half = problem.gait.foot_distance / 2
+    left, right = Footstep(LEFT, 0.0, half, 0.0), Footstep(RIGHT, 0.0, -half, 0.0)
+    state = PlanState(np.zeros((2, 3)), left, right, (0.0, -half), 0.0, problem.gait.step_time, 0.1)
+    plan(problem, state, STILL, np.array([[1.0, 0.0, 0.1]]), plan(problem, state, STILL))
 
 
 def plan(
@@ -258,6 +268,8 @@ def _solve(
     wide = problem.gait.steps * numbers.reach + numbers.body + 0.5
     around = near(circles, foot.x, foot.y, wide) if len(circles) else NONE
     pinned = known and 0 < state.remaining <= problem.freeze and state.halt != 0
+    if pinned:
+        yaws, drawn = _from_landing(problem, guess.feet[0], yaws, drawn, state, velocity)
     tables, moment = problem.tables, _moment(state, velocity)
     matrix, low, high, marks, slack, y, lower, inverse, shares, hard, zmp = assemble(
         tables, numbers, moment, com, drawn, yaws, guess.feet - place, guess.jerks, around, pinned
@@ -297,6 +309,21 @@ def drawn_to(problem: Nmpc, state: PlanState, velocity: Velocity) -> Float[np.nd
     """Displacements by the command, each from the foot before [m]."""
     gait, foot = problem.gait, state.support
     return np.array(displacements(_apart(gait, velocity), gait.step_time, velocity, foot.side, foot.yaw, gait.steps))
+
+
+def _from_landing(
+    problem: Nmpc,
+    landing: Float[np.ndarray, "3"],
+    yaws: Float[np.ndarray, " soles"],
+    drawn: Float[np.ndarray, "steps 2"],
+    state: PlanState,
+    velocity: Velocity,
+) -> tuple[Float[np.ndarray, " soles"], Float[np.ndarray, "steps 2"]]:
+    """Yaws and displacements where the next landing is settled already: the others follow from it."""
+    after = state._replace(support=Footstep(1 - state.support.side, *landing.tolist()))
+    following = drawn_to(problem, after, velocity)
+    yaws = np.concatenate([yaws[:1], turned(problem, float(landing[2]), velocity)[:-1]])
+    return yaws, np.concatenate([drawn[:1], following[:-1]])
 
 
 def _apart(gait: Gait, velocity: Velocity) -> float:

@@ -20,6 +20,7 @@ from numba import njit
 
 SOFT = 8  # DAQP's mark of a row that may be violated
 SLACK_ZMP, SLACK_FEET, SLACK_BODY = 1e-8, 1e-6, 1e-5  # violation e costs e^2 / (2 slack): balance before clearance
+TRUST = 0.001  # a turn differs by no more from the commanded one, so that rows linearised there still hold [rad]
 FOOT_PATH = (1.0, 0.7, 0.35)  # where a swing foot is kept clear: shares of its way, landing first
 BODY_ROWS = 4  # how often the body is kept clear over the horizon
 
@@ -254,8 +255,9 @@ def foot_rows(matrix, low, high, tables, numbers, moment, inverse, yaws, last, p
             low[m], high[m] = -1e30, tables.hull[e, 2]
             m += 1
         matrix[m, 2 * (count + feet) + k] = 1.0 / numbers.yaw
-        low[m] = -numbers.longest_turn - (yaws[k + 1] - yaws[k])
-        high[m] = numbers.longest_turn - (yaws[k + 1] - yaws[k])
+        turn = yaws[k + 1] - yaws[k]
+        low[m] = min(max(-numbers.longest_turn - turn, -TRUST), 0.0)
+        high[m] = max(min(numbers.longest_turn - turn, TRUST), 0.0)
         m += 1
     return m
 
