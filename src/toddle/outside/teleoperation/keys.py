@@ -24,7 +24,11 @@ from toddle.failures import BadInput
 from toddle.signals import Velocity
 from toddle.walk.gate import SILENCE, STILL
 
-HELP = "up/down w/s: speed   left/right a/d: turn   , .: sideways   + -: all faster, slower   space: stop   q: quit"
+HELP = """\
+up, down or w, s      faster, slower      left, right or a, d   turn
+, and .               sideways            + and -               all of it more, less
+space                 stop                q                     quit"""
+"""What a person needs to know."""
 
 QUIT, LOST, TOLD = "quit", "the terminal is lost", "told to end"
 """How driving ends."""
