@@ -7,7 +7,7 @@ time. Nothing here knows who they are.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -30,6 +30,7 @@ _FALLEN = 0.8  # tilt of the waist from which nothing brings it back [rad]
 _STOPPING = 8.0  # the most that a stop may take [s]
 
 
+@runtime_checkable
 class Robot(Protocol):
     """A humanoid that is driven by its servos."""
 
