@@ -125,8 +125,8 @@ class Recorder:
     ) -> None:
         """One tick of the pattern alone."""
         parts = (plan.com, plan.zmp, plan.yaw, plan.feet, plan.feet_velocity, plan.feet_acceleration, plan.load)
-        flat = [part.ravel() for part in parts]
-        self._rows.append(np.concatenate([[t], asked, allowed, *flat, [float(support), posture_ms]]))
+        numbers = (np.array([t, *asked, *allowed]), *(part.ravel() for part in parts), np.array([support, posture_ms]))
+        self._rows.append(np.concatenate(numbers))
 
     def add_solve(self, status: str, ms: float) -> None:
         """One plan of the predictive controller."""
