@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from toddle.signals import Velocity
-from toddle.walk.pattern.nmpc import GAP, Nmpc, Plan, PlanState, drawn_to, turned
+from toddle.walk.pattern.nmpc_problem import GAP, Nmpc, Plan, PlanState, drawn_to, turned
 from toddle.walk.pattern.nmpc_kernels import TRUST
 
 

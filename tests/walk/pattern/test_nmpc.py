@@ -33,6 +33,7 @@ class Programme:
         self.parts = assemble(
             problem.tables, problem.numbers, moment, com, drawn, yaws, last.feet - place, last.jerks, near_by, False
         )
+        self.problem = self.parts[:5]
         self.matrix, self.low, self.high, _, self.slack, y, lower, inverse, shares, self.hard, self.soft = self.parts
         n = self.matrix.shape[1]
 

@@ -64,3 +64,17 @@ def test_a_second_solver_agrees(seed):
     wide = np.hstack([rows, np.vstack([np.zeros((6, 6)), np.eye(6)])])
     wanted = quadprog.solve_qp(hessian, np.zeros(14), wide.T, low)[0][:8]
     np.testing.assert_allclose(found.u, wanted, atol=1e-7)
+
+
+def test_an_answer_does_not_depend_on_the_programmes_before():
+    rng = np.random.default_rng(0)
+    given = [
+        problem(rng.normal(size=(12, 8)), rng.uniform(-1, 0.3, 12), np.full(12, NOTHING), range(6, 12), 10.0**-k)
+        for k in range(6)
+    ]
+    contradiction = problem([[1.0] * 8, [1.0] * 8] * 6, [1.0, -NOTHING] * 6, [NOTHING, -1.0] * 6)
+    first = [least_distance(*one).u for one in given]
+    assert least_distance(*contradiction).status == Status.INFEASIBLE
+    for one, wanted in reversed(list(zip(given, first, strict=True))):
+        np.testing.assert_allclose(least_distance(*one).u, wanted, atol=1e-12)
+        least_distance(*contradiction)

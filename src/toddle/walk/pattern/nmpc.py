@@ -16,8 +16,6 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -25,188 +23,43 @@ from jaxtyping import Float
 from toddle.robots.gait import Gait
 from toddle.robots.humanoid import LEFT, RIGHT
 from toddle.signals import Footstep, Velocity
-from toddle.walk.pattern.displacement import Pair, displacements
-from toddle.walk.pattern.feasible import landing_hull, widening
-from toddle.walk.pattern.nmpc_kernels import Moment, Numbers, Tables, assemble, shift, unfold
+from toddle.walk.pattern.displacement import displacements
+from toddle.walk.pattern.nmpc_kernels import Moment, assemble, shift, unfold
+from toddle.walk.pattern.nmpc_problem import (
+    NEVER,
+    STILL,
+    Nmpc,
+    Plan,
+    PlanState,
+    Weights,
+    apart,
+    build,
+    document_weights,
+    drawn_to,
+    turned,
+)
 from toddle.walk.pattern.obstacles import NONE, near
 from toddle.walk.pattern.plan import Status
 from toddle.walk.pattern.quadratic import least_distance
-from toddle.walk.pattern.time_stepping import time_stepping
 
-STILL = Velocity(0.0, 0.0, 0.0)
+__all__ = ["NEVER", "STILL", "Nmpc", "Plan", "PlanState", "Weights", "document_weights", "nmpc", "plan"]
 
-NEVER = -1
-"""``halt`` of a robot that walks on."""
-
-GAP = 0.01
-"""Kept between a sole and an obstacle [m]."""
-
-_STILL = 1e6  # weight of the displacement that ends with both feet side by side
-_LAST = 1e-3  # without displacements, a foot that no cost touches is held by this share of beta
 _BROKEN = 1e-5  # a hard row may be exceeded by so much [m], [rad]
 
 
-@dataclass(frozen=True)
-class Weights:
-    """Of the objective: 2.43 to 2.46, and two more.
-
-    Attributes:
-        alpha: of the velocity.
-        beta: of the ZMP's distance from its reference.
-        gamma: of the jerk.
-        delta: of a footstep's distance from its displacement.
-        yaw: of a turn's distance from the commanded one.
-    """
-
-    alpha: float = 0.01
-    beta: float = 1e2
-    gamma: float = 1e-5
-    delta: float = 1e3
-    yaw: float = 1e5
-
-
-def document_weights(gait: Gait) -> Weights:
-    """The weights that the document prints for a gait; no displacements."""
-    alpha, beta, gamma = gait.objective
-    return Weights(alpha, beta, gamma, 0.0)
-
-
-@dataclass(frozen=True)
-class Nmpc:
-    """What doesn't change between iterations. Made by `nmpc`.
-
-    Attributes:
-        gait: how the robot steps.
-        weights: of the objective.
-        tables: time-stepping and factor.
-        numbers: weights and lengths, for the kernels.
-        freeze: the next landing is no longer moved so shortly before it [s].
-    """
-
-    gait: Gait
-    weights: Weights
-    tables: Tables
-    numbers: Numbers
-    freeze: float
-
-
-class PlanState(NamedTuple):
-    """Where the robot is, in the plan's frame.
-
-    Attributes:
-        com: x and y of the centre of mass: position, velocity, acceleration (omega^2 (c - p)) [m, s].
-        support: the sole that carries in this step.
-        lifted: where the other sole stood when this step began.
-        origin: where the ZMP was when this step began [m]: the other sole, or between the feet out of standing.
-        phase: time since this step began [s].
-        remaining: until it ends [s]; any, the following steps take the gait's time.
-        double_support: how long the weight takes to come over from ``origin`` [s].
-        halt: the robot stands after so many landings, with both feet side by side; 0: it stands; `NEVER`.
-    """
-
-    com: Float[np.ndarray, "2 3"]
-    support: Footstep
-    lifted: Footstep
-    origin: Pair
-    phase: float
-    remaining: float
-    double_support: float
-    halt: int = NEVER
-
-
-class Plan(NamedTuple):
-    """An iteration's answer; ``feet`` and the rest are usable whatever the status is.
-
-    Attributes:
-        feet: the landings to come: x, y [m], yaw [rad]; the first is that of the foot in the air.
-        displacement: of each landing from the one before, the first from the support foot [m].
-        jerk: of x and y until the next sample [m/s^3].
-        jerks: over the horizon.
-        zmp: reference at the samples [m].
-        status: solved, or why this is the last plan shifted.
-        milliseconds: the iteration took, wall clock.
-        obstacle: a clearance decides the plan.
-        violation: of the soft rows of balance (ZMP, capture at the horizon's end), the greatest [m].
-        overlap: of the soft clearance rows, the greatest [m].
-        state: it was made at.
-    """
-
-    feet: Float[np.ndarray, "steps 3"]
-    displacement: Float[np.ndarray, "steps 2"]
-    jerk: Float[np.ndarray, "2"]
-    jerks: Float[np.ndarray, "2 samples"]
-    zmp: Float[np.ndarray, "samples 2"]
-    status: Status
-    milliseconds: float
-    obstacle: bool
-    violation: float
-    overlap: float
-    state: PlanState
-
-
 def nmpc(gait: Gait, weights: Weights | None = None, *, freeze: float = 0.06, body: float | None = None) -> Nmpc:
-    """The problem of a gait.
+    """The problem of a gait, ready for its first iteration.
 
     Args:
         gait: how the robot steps.
         weights: of the objective; None: the defaults, which track the command.
         freeze: the next landing is no longer moved so shortly before it [s].
         body: radius kept from obstacles around the centre of mass [m]; None: half the foot distance and 0.12.
+
+    Raises:
+        BadInput: the gait's hull can't be used.
     """
-    weights = weights or Weights()
-    step = time_stepping(gait.preview, gait.sample, gait.com_height)
-    hessian = (
-        weights.alpha * step.velocity_jerk.T @ step.velocity_jerk
-        + weights.beta * step.zmp_jerk.T @ step.zmp_jerk
-        + weights.gamma * np.eye(gait.preview)
-    )
-    upper = np.linalg.cholesky(hessian[::-1, ::-1])[::-1, ::-1]
-    inverse = np.ascontiguousarray(np.linalg.inv(upper))
-    position, speed, zmp = (
-        np.ascontiguousarray(u @ inverse.T) for u in (step.position_jerk, step.velocity_jerk, step.zmp_jerk)
-    )
-    hull = landing_hull(gait)
-    tables = Tables(
-        step.position_state,
-        step.velocity_state,
-        step.zmp_state,
-        step.zmp_jerk,
-        step.position_jerk,
-        position,
-        speed,
-        zmp,
-        inverse,
-        hull.rows,
-    )
-    front, rear = (gait.foot_ahead + way * (gait.foot_length / 2 - gait.margin[0]) for way in (1, -1))
-    growth = math.exp(gait.omega * gait.step_time)
-    inner, outer = hull.corners[:, 1].min(), hull.corners[:, 1].max()
-    numbers = Numbers(
-        alpha=weights.alpha,
-        beta=weights.beta,
-        delta=weights.delta,
-        still=max(_STILL, weights.delta),
-        last=0.0 if weights.delta > 0 else _LAST * weights.beta,
-        yaw=math.sqrt(weights.yaw),
-        step_time=gait.step_time,
-        double_support=gait.double_support,
-        sample=gait.sample,
-        longest_turn=gait.longest_turn,
-        rear=min(rear, 0.0),
-        front=max(front, 0.0),
-        side=gait.foot_width / 2 - gait.margin[1],
-        half_length=gait.foot_length / 2,
-        half_width=gait.foot_width / 2,
-        ahead=gait.foot_ahead,
-        gap=GAP,
-        body=gait.foot_distance / 2 + 0.12 if body is None else body,
-        reach=hull.reach,
-        omega=gait.omega,
-        end_ahead=float(np.abs(hull.corners[:, 0]).max() * growth / (growth - 1)),
-        end_inner=float((inner - outer / growth) / (1 - growth**-2)),
-        end_outer=float((outer - inner / growth) / (1 - growth**-2)),
-    )
-    problem = Nmpc(gait, weights, tables, numbers, freeze)
+    problem = build(gait, weights or Weights(), freeze, body)
     _warm_up(problem)
     return problem
 
@@ -298,19 +151,6 @@ def _solve(
     )
 
 
-def turned(problem: Nmpc, yaw: float, velocity: Velocity) -> Float[np.ndarray, " soles"]:
-    """Yaws by the command: of the support foot and of the landings to come [rad]."""
-    most = problem.gait.longest_turn
-    turn = min(max(velocity.omega * problem.gait.step_time, -most), most)
-    return yaw + turn * np.arange(problem.gait.steps + 1)
-
-
-def drawn_to(problem: Nmpc, state: PlanState, velocity: Velocity) -> Float[np.ndarray, "steps 2"]:
-    """Displacements by the command, each from the foot before [m]."""
-    gait, foot = problem.gait, state.support
-    return np.array(displacements(_apart(gait, velocity), gait.step_time, velocity, foot.side, foot.yaw, gait.steps))
-
-
 def _from_landing(
     problem: Nmpc,
     landing: Float[np.ndarray, "3"],
@@ -324,11 +164,6 @@ def _from_landing(
     following = drawn_to(problem, after, velocity)
     yaws = np.concatenate([yaws[:1], turned(problem, float(landing[2]), velocity)[:-1]])
     return yaws, np.concatenate([drawn[:1], following[:-1]])
-
-
-def _apart(gait: Gait, velocity: Velocity) -> float:
-    """The foot distance, widened where the hull asks for it [m]."""
-    return gait.foot_distance + (widening(velocity, gait) or 0.0)
 
 
 def nominal(problem: Nmpc, state: PlanState, velocity: Velocity) -> Plan:
@@ -355,7 +190,7 @@ def shifted(problem: Nmpc, last: Plan, state: PlanState, velocity: Velocity) -> 
     if switched:
         speed = velocity if all(map(math.isfinite, velocity)) else STILL
         side, yaw = (before.support.side + len(last.feet)) % 2, float(last.feet[-1, 2])
-        step = np.array(displacements(_apart(gait, speed), gait.step_time, speed, side, yaw, 1)[0])
+        step = np.array(displacements(apart(gait, speed), gait.step_time, speed, side, yaw, 1)[0])
         turn = float(turned(problem, yaw, speed)[1])
     jerks, zmp, feet, moved = shift(last.jerks, last.zmp, last.feet, last.displacement, late, switched, step, turn)
     return last._replace(

@@ -8,6 +8,7 @@ the identity for a Hessian, the factorisation drops out.
 
 from __future__ import annotations
 
+import threading
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -52,25 +53,24 @@ def least_distance(
         slack: reciprocal of a soft row's weight.
         seconds: DAQP looks at the clock at every 32nd change of the active set, and gives up after these.
     """
-    model = daqp.Model()
-    model.settings = _SETTINGS if seconds is None else _SETTINGS | {"time_limit": max(seconds, 1e-9)}
-    count = matrix.shape[1]
-    ready, _ = model.setup(_identity(count), _nothing(count), matrix, high, low, marks)
+    rows, count = matrix.shape
+    workspace = _workspace(threading.get_ident(), rows, count)
+    workspace.settings = _SETTINGS | {"time_limit": 0.0 if seconds is None else max(seconds, 1e-9)}
+    ready = workspace.update(A=matrix, bupper=high, blower=low, sense=marks)
     if ready < 0:
         return Answer(np.zeros(count), _status(ready, np.zeros(count)), 0)
-    model.soft_weights(slack, slack)
-    u, _, flag, info = model.solve()
+    workspace.soft_weights(slack, slack)
+    u, _, flag, info = workspace.solve()
     return Answer(u, _status(flag, u), info["iterations"])
 
 
-@lru_cache
-def _identity(count: int) -> Float[np.ndarray, "count count"]:
-    return np.eye(count)
-
-
-@lru_cache
-def _nothing(count: int) -> Float[np.ndarray, " count"]:
-    return np.zeros(count)
+@lru_cache(maxsize=32)
+def _workspace(_thread: int, rows: int, count: int) -> daqp.Model:
+    """Memory for one shape of programme in one thread; what it was last used for doesn't matter."""
+    model = daqp.Model()
+    marks, bounds = np.full(rows, 8, np.int32), np.ones(rows)
+    model.setup(np.eye(count), np.zeros(count), np.ones((rows, count)), bounds, -bounds, marks)
+    return model
 
 
 def _status(flag: int, u: Float[np.ndarray, " unknowns"]) -> Status:
