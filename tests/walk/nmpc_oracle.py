@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from toddle.signals import Velocity
-from toddle.walk.pattern.nmpc_problem import GAP, Nmpc, Plan, PlanState, drawn_to, turned
 from toddle.walk.pattern.nmpc_kernels import TRUST
+from toddle.walk.pattern.nmpc_problem import GAP, Nmpc, Plan, PlanState, drawn_to, turned
 
 
 class Row(NamedTuple):

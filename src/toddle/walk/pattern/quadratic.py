@@ -8,8 +8,6 @@ the identity for a Hessian, the factorisation drops out.
 
 from __future__ import annotations
 
-import threading
-from functools import lru_cache
 from typing import NamedTuple
 
 import daqp
@@ -19,6 +17,9 @@ from jaxtyping import Float, Int32
 from toddle.walk.pattern.plan import Status
 
 _SETTINGS = {"iter_limit": 500, "primal_tol": 1e-9}  # a solve takes about ten; tolerance of a row scaled to norm 1
+
+_SHAPES = 64  # so many are kept
+_IDLE: dict[tuple[int, int], list[daqp.Model]] = {}
 
 
 class Answer(NamedTuple):
@@ -53,24 +54,45 @@ def least_distance(
         slack: reciprocal of a soft row's weight.
         seconds: DAQP looks at the clock at every 32nd change of the active set, and gives up after these.
     """
-    rows, count = matrix.shape
-    workspace = _workspace(threading.get_ident(), rows, count)
+    shape = matrix.shape
+    workspace = _taken(shape)
+    try:
+        return _solved(workspace, matrix, low, high, marks, slack, seconds)
+    finally:
+        _IDLE.setdefault(shape, []).append(workspace)
+
+
+def _solved(
+    workspace: daqp.Model,
+    matrix: Float[np.ndarray, "rows unknowns"],
+    low: Float[np.ndarray, " rows"],
+    high: Float[np.ndarray, " rows"],
+    marks: Int32[np.ndarray, " rows"],
+    slack: Float[np.ndarray, " rows"],
+    seconds: float | None,
+) -> Answer:
     workspace.settings = _SETTINGS | {"time_limit": 0.0 if seconds is None else max(seconds, 1e-9)}
     ready = workspace.update(A=matrix, bupper=high, blower=low, sense=marks)
     if ready < 0:
-        return Answer(np.zeros(count), _status(ready, np.zeros(count)), 0)
+        nothing = np.zeros(matrix.shape[1])
+        return Answer(nothing, _status(ready, nothing), 0)
     workspace.soft_weights(slack, slack)
     u, _, flag, info = workspace.solve()
     return Answer(u, _status(flag, u), info["iterations"])
 
 
-@lru_cache(maxsize=32)
-def _workspace(_thread: int, rows: int, count: int) -> daqp.Model:
-    """Memory for one shape of programme in one thread; what it was last used for doesn't matter."""
-    model = daqp.Model()
-    marks, bounds = np.full(rows, 8, np.int32), np.ones(rows)
-    model.setup(np.eye(count), np.zeros(count), np.ones((rows, count)), bounds, -bounds, marks)
-    return model
+def _taken(shape: tuple[int, int]) -> daqp.Model:
+    """Memory for one shape of programme, for one solve at a time; what it was last used for doesn't matter."""
+    if len(_IDLE) > _SHAPES:
+        _IDLE.clear()
+    try:
+        return _IDLE[shape].pop()
+    except (KeyError, IndexError):
+        rows, count = shape
+        marks, bounds = np.full(rows, 8, np.int32), np.ones(rows)
+        model = daqp.Model()
+        model.setup(np.eye(count), np.zeros(count), np.ones(shape), bounds, -bounds, marks)
+        return model
 
 
 def _status(flag: int, u: Float[np.ndarray, " unknowns"]) -> Status:
