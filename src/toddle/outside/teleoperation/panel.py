@@ -102,8 +102,8 @@ def frame_of(title: str, keys: str, status: Status) -> Frame:
         table.add_column(head, justify="left" if not head else "right")
     rows = (("command", status.asked), ("allowed", status.allowed), ("measured", status.measured))
     for name, velocity in rows:
-        units = (f"{velocity.vx:+.3f} m/s", f"{velocity.vy:+.3f} m/s", f"{velocity.omega:+.3f} rad/s")
-        table.add_row(name, *units)
+        units = zip(velocity, ("m/s", "m/s", "rad/s"), strict=True)
+        table.add_row(name, *(f"{part:+.3f} {unit}" if math.isfinite(part) else "-" for part, unit in units))
     facts = Table(box=None, padding=(0, 2), show_header=False, show_edge=False)
     facts.add_row("ZMP margin", _margin(status.margin))
     facts.add_row("support foot", _FEET[status.support])
@@ -125,4 +125,6 @@ def _margin(margin: float) -> Text:
 
 
 def _velocity(velocity: Velocity) -> str:
+    if not all(map(math.isfinite, velocity)):
+        return "nothing yet"
     return f"{velocity.vx:+.2f} {velocity.vy:+.2f} m/s {velocity.omega:+.2f} rad/s"
