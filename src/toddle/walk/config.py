@@ -25,6 +25,7 @@ class WalkConfig:
         plan_steps: the predictive controller plans the steps; else they follow from the command alone.
         step: weights of the step adjustment.
         zmp_gain: K of p = p_ref + K (xi - xi_ref).
+        pressed: share of the soles, about their middles, that the zero moment point is kept in.
         follow: share of the measured state in the reference, each tick.
         offset_time: of the integral that takes away what the servos sag [s].
         offset_most: its limit [m].
@@ -50,6 +51,7 @@ class WalkConfig:
     plan_steps: bool = True
     step: StepWeights = field(default_factory=StepWeights)
     zmp_gain: float = 1.5
+    pressed: float = 1.0
     follow: float = 0.1
     offset_time: float = 1.0
     offset_most: float = 0.03

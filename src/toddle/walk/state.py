@@ -41,7 +41,8 @@ class Step(NamedTuple):
         end: when the swing foot lands, in the same time [s].
         landing: displacement of the landing from the stance foot, in the stance foot's frame [m].
         turn: yaw of the landing over the stance foot's [rad].
-        nominal: the displacement as planned.
+        nominal: the displacement that the command asked for when the step began.
+        planned: the displacement as planned last.
         final: the robot will stand afterwards.
         moved: the landing was moved far from the plan by a push.
     """
@@ -55,6 +56,7 @@ class Step(NamedTuple):
     landing: Pair
     turn: float
     nominal: Pair
+    planned: Pair
     final: bool
     moved: bool = False
 
@@ -90,6 +92,7 @@ class WalkerState(NamedTuple):
         estimate: the last one.
         plan: the last plan, and how old it is [s].
         plan_age: see plan.
+        later: displacements of the footsteps after the landing under way, in the plan's frame [m].
         fallbacks: plans that could not be used, one after another.
     """
 
@@ -111,6 +114,7 @@ class WalkerState(NamedTuple):
     estimate: Estimate | None
     plan: Plan | None
     plan_age: float
+    later: tuple[Pair, ...]
     fallbacks: int
 
 

@@ -16,6 +16,7 @@ from toddle.walk.balance.pendulum import Pair, Timing, offset, timing
 from toddle.walk.balance.step_adjustment import Aim, Bounds
 from toddle.walk.config import WalkConfig
 from toddle.walk.pattern.displacement import displacements, rotate
+from toddle.walk.pattern.nmpc import apart
 from toddle.walk.state import Landing, Pose, Step
 
 STILL = Velocity(0.0, 0.0, 0.0)
@@ -52,7 +53,7 @@ def chain(gait: Gait, steps: tuple[Pair, ...], final: bool) -> Chain:
 
 def by_command(gait: Gait, velocity: Velocity, stance: int, yaw: float) -> tuple[Pair, ...]:
     """The next footsteps that follow from the command alone, in the plan's frame [m]."""
-    return tuple(displacements(gait.foot_distance, gait.step_time, velocity, stance, yaw, _PREVIEWED))
+    return tuple(displacements(apart(gait, velocity), gait.step_time, velocity, stance, yaw, _PREVIEWED))
 
 
 def first_stance(velocity: Velocity) -> int:
@@ -76,9 +77,7 @@ def shift_zmp(gait: Gait, xi: Pair, foot: Pair, ahead: Chain, left: float) -> Pa
 def aim(step: Step, ahead: Chain, gait: Gait) -> Aim:
     """The planned landing in the stance foot's frame."""
     yaw = step.foot[2]
-    return Aim(
-        rotate(-yaw, ahead.displacements[0]), gait.step_time, ahead.kappa, rotate(-yaw, ahead.rest), ahead.growth
-    )
+    return Aim(step.planned, gait.step_time, ahead.kappa, rotate(-yaw, ahead.rest), ahead.growth)
 
 
 def bounds(step: Step, gait: Gait, config: WalkConfig) -> Bounds:
@@ -107,13 +106,14 @@ def landing_box(gait: Gait) -> tuple[float, float, float]:
 def begin(gait: Gait, stance: int, foot: Pose, origin: Pair, ahead: Chain, turn: float, final: bool) -> Step:
     """A step that starts now."""
     nominal = rotate(-foot[2], ahead.displacements[0])
-    return Step(stance, foot, origin, gait.double_support, 0.0, gait.step_time, nominal, turn, nominal, final)
+    return Step(stance, foot, origin, gait.double_support, 0.0, gait.step_time, nominal, turn, nominal, nominal, final)
 
 
-def catching(gait: Gait, stance: int, foot: Pose, origin: Pair) -> Step:
-    """A step out of standing that catches a push."""
+def catching(gait: Gait, stance: int, foot: Pose, origin: Pair) -> tuple[Step, tuple[Pair, ...]]:
+    """A step out of standing that catches a push, and the displacements after it."""
     ahead = chain(gait, by_command(gait, STILL, stance, foot[2]), final=True)
-    return begin(gait, stance, foot, origin, ahead, 0.0, final=True)._replace(double_support=_CATCH_DS)
+    step = begin(gait, stance, foot, origin, ahead, 0.0, final=True)._replace(double_support=_CATCH_DS)
+    return step, ahead.displacements[1:]
 
 
 def side_by_side(gait: Gait, a: Pose, b: Pose) -> bool:

@@ -17,7 +17,7 @@ from jaxtyping import Float
 
 from toddle.robots.gait import Gait
 from toddle.robots.humanoid import LEFT, RIGHT, Humanoid
-from toddle.signals import Circle, Reference, Senses, Velocity
+from toddle.signals import Circle, Footstep, Reference, Senses, Velocity
 from toddle.walk.balance import pendulum, support
 from toddle.walk.balance.estimate import Estimate, Observer, estimate, observer
 from toddle.walk.balance.feet import Feet, rest, swing
@@ -25,9 +25,13 @@ from toddle.walk.balance.pendulum import Pair
 from toddle.walk.balance.step_adjustment import adjust
 from toddle.walk.config import TICK, WalkConfig
 from toddle.walk.pattern.displacement import rotate
+from toddle.walk.pattern.nmpc import NEVER, Nmpc, PlanState, nmpc
+from toddle.walk.pattern.nmpc import plan as next_plan
+from toddle.walk.pattern.obstacles import NONE
+from toddle.walk.pattern.plan import Status
 from toddle.walk.posture.model import PostureModel, posture_model
 from toddle.walk.posture.solve import WEIGHTS, PostureTarget, solve_posture
-from toddle.walk.posture.survey import static_torques
+from toddle.walk.posture.survey import static_torques, survey
 from toddle.walk.state import Action, Landing, Mode, Pose, Step, WalkerState
 from toddle.walk.stepping import (
     STILL,
@@ -45,6 +49,7 @@ from toddle.walk.stepping import (
     side_by_side,
 )
 
+_PERSISTS = 5  # so many unusable plans, one after another, end the walk
 _SHRUNK = 0.8  # of the soles: a DCM outside of this, while standing, calls for a step
 
 
@@ -56,11 +61,13 @@ class Walker:
         humanoid: the robot.
         config: gains and switches.
         observer: what estimating and inverse kinematics need of it, prepared.
+        problem: what the predictive controller needs of it, prepared.
     """
 
     humanoid: Humanoid
     config: WalkConfig
     observer: Observer
+    problem: Nmpc
 
     @property
     def gait(self) -> Gait:
@@ -82,7 +89,7 @@ class Walker:
         step = begin(self.gait, RIGHT, foot, (0.0, 0.0), ahead, 0.0, True)
         return WalkerState(
             0.0, Mode.STAND, step, 0.0, feet.copy(), feet, still, still, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0),
-            (0.5, 0.5), self.humanoid.home, STILL, (), None, None, math.inf, 0,
+            (0.5, 0.5), self.humanoid.home, STILL, (), None, None, math.inf, (), 0,
         )  # fmt: skip
 
     def step(
@@ -99,11 +106,13 @@ class Walker:
         Returns:
             The next state, and what to do.
         """
+        if state.fallbacks >= _PERSISTS:
+            velocity = STILL
         sensed = estimate(self.observer, senses, state.anchors, np.array(state.load), state.estimate, TICK)
         state = state._replace(t=state.t + TICK, estimate=sensed)
         state = self._change_mode(state, sensed, velocity)
         wanted = _sum(velocity, state.correction) if moving(velocity) else STILL
-        state, ahead = self._plan(state, wanted, circles)
+        state, ahead = self._plan(state, sensed, wanted, senses, circles)
         state, reference_zmp, reference_dcm = self._adjusted(state, sensed, ahead)
         zmp = self._feedback(state, sensed, reference_zmp, reference_dcm)
         state = self._follow(state, sensed, zmp)
@@ -137,8 +146,10 @@ class Walker:
             yaw = float(state.anchors[:, 3].mean())
             aside = rotate(-yaw, (xi[0] - middle[0], xi[1] - middle[1]))[1]
             stance = RIGHT if aside > 0 else LEFT
-            step = catching(self.gait, stance, _pose(state.anchors, stance), state.zmp)
-            return state._replace(mode=Mode.STEP, step=step, landings=(), correction=STILL)
+            step, later = catching(self.gait, stance, _pose(state.anchors, stance), state.zmp)
+            return state._replace(
+                mode=Mode.STEP, step=step, later=later, plan_age=math.inf, landings=(), correction=STILL
+            )
         if not moving(velocity):
             return state
         stance = first_stance(velocity)
@@ -156,7 +167,7 @@ class Walker:
         wanted = STILL if final else _sum(velocity, state.correction)
         ahead = chain(self.gait, by_command(self.gait, wanted, stance, foot[2]), final)
         step = begin(self.gait, stance, foot, origin, ahead, wanted.omega * self.gait.step_time, final)
-        return state._replace(mode=Mode.STEP, step=step, plan_age=math.inf)
+        return state._replace(mode=Mode.STEP, step=step, later=ahead.displacements[1:], plan_age=math.inf)
 
     def _land(self, state: WalkerState, sensed: Estimate, velocity: Velocity) -> WalkerState:
         landed = 1 - state.step.stance
@@ -168,22 +179,71 @@ class Walker:
         pose = _pose(anchors, landed)
         landings = (*state.landings[-2:], Landing(state.t, landed, pose, velocity))
         correction = state.correction
-        if moving(velocity) and not state.step.moved:
+        if moving(velocity) and not state.step.moved and not (state.plan and state.plan.obstacle):
             correction = corrected(correction, landings, self.config)
         state = state._replace(anchors=anchors, landings=landings, correction=correction)
         if not moving(velocity) and side_by_side(self.gait, state.step.foot, pose):
             return state._replace(mode=Mode.STAND, correction=STILL)
         return self._begin(state, landed, state.step.foot[:2], velocity)
 
-    def _plan(self, state: WalkerState, wanted: Velocity, circles: tuple[Circle, ...]) -> tuple[WalkerState, Chain]:
-        """The previewed footsteps: the landing under way stays as it was when its step began, the others follow."""
-        step = state.step
+    def _plan(
+        self, state: WalkerState, sensed: Estimate, wanted: Velocity, senses: Senses, circles: tuple[Circle, ...]
+    ) -> tuple[WalkerState, Chain]:
+        """The footsteps to come: planned again where it is time, else as they were."""
+        step, gait = state.step, self.gait
         if state.mode == Mode.SHIFT:
-            steps = by_command(self.gait, wanted, step.stance, step.foot[2])
-            return state, chain(self.gait, steps, final=False)
-        yaw = step.foot[2] + step.turn
-        later = by_command(self.gait, wanted, 1 - step.stance, yaw)
-        return state, chain(self.gait, (rotate(step.foot[2], step.nominal), *later[:-1]), step.final)
+            return state, chain(gait, by_command(gait, wanted, step.stance, step.foot[2]), final=False)
+        age = state.plan_age + TICK
+        if not self.config.plan_steps:
+            state = state._replace(later=by_command(gait, wanted, 1 - step.stance, step.foot[2] + step.turn)[:-1])
+        elif age >= self.config.lead - TICK / 2 and (state.mode == Mode.STEP or state.fallbacks):
+            state = self._planned_again(state, sensed, wanted, self._placed(sensed, senses, circles))
+        else:
+            state = state._replace(plan_age=age)
+        first = rotate(step.foot[2], state.step.planned)
+        return state, chain(gait, (first, *state.later), step.final)
+
+    def _planned_again(
+        self, state: WalkerState, sensed: Estimate, wanted: Velocity, circles: Float[np.ndarray, "circles 3"]
+    ) -> WalkerState:
+        """One iteration of the predictive controller, from the measured state."""
+        step = state.step
+        other = state.anchors[1 - step.stance]
+        omega = self.gait.omega
+        com = np.column_stack([sensed.com[:2], sensed.com_velocity[:2], omega**2 * (sensed.com[:2] - state.zmp)])
+        stands = state.mode == Mode.STAND
+        walks_on = NEVER if moving(wanted) else 2
+        problem = PlanState(
+            com,
+            Footstep(step.stance, *step.foot),
+            Footstep(1 - step.stance, float(other[0]), float(other[1]), float(other[3])),
+            step.origin,
+            step.phase,
+            max(step.end - step.phase, 0.0),
+            step.double_support,
+            0 if stands else 1 if step.final else walks_on,
+            None if step.final or stands else (*rotate(step.foot[2], step.nominal), step.turn),
+        )
+        plan = next_plan(self.problem, problem, wanted, circles, state.plan, self.config.deadline_ms)
+        fallbacks = 0 if plan.status == Status.SOLVED else state.fallbacks + 1
+        state = state._replace(plan=plan, plan_age=0.0, fallbacks=fallbacks)
+        if stands:
+            return state
+        displaced = [(float(x), float(y)) for x, y in plan.displacement]
+        step = step._replace(planned=rotate(-step.foot[2], displaced[0]), turn=float(plan.feet[0, 2]) - step.foot[2])
+        return state._replace(step=step, later=tuple(displaced[1:]))
+
+    def _placed(self, sensed: Estimate, senses: Senses, circles: tuple[Circle, ...]) -> Float[np.ndarray, "circles 3"]:
+        """Obstacles of the world in the plan's frame, by where the waist is in both."""
+        if not circles or not np.isfinite(senses.place).all():
+            return NONE
+        here = survey(self.model, sensed.q).waist_p
+        turn = sensed.yaw - float(senses.place[2])
+        placed = np.array(circles, float)
+        for row in placed:
+            dx, dy = rotate(turn, (row[0] - float(senses.place[0]), row[1] - float(senses.place[1])))
+            row[:2] = here[0] + dx, here[1] + dy
+        return placed
 
     def _adjusted(self, state: WalkerState, sensed: Estimate, ahead: Chain) -> tuple[WalkerState, Pair, Pair]:
         """Place and time of the landing, the planned zero moment point, and the DCM that goes with them."""
@@ -233,7 +293,7 @@ class Walker:
         )
         middle = state.anchors[:, :2].mean(axis=0)
         inside = zmp if state.mode == Mode.STEP else (float(middle[0]), float(middle[1]))
-        return support.clip(self.area(state, 1.0), inside, wanted)
+        return support.clip(self.area(state, self.config.pressed), inside, wanted)
 
     def area(self, state: WalkerState, share: float = 1.0) -> support.Corners:
         """The area of the soles that stand, counter-clockwise."""
@@ -310,7 +370,7 @@ class Walker:
     ) -> tuple[WalkerState, Action]:
         started = time.perf_counter()
         target = self._target(state, reference)
-        posture = solve_posture(self.model, state.q, target, 3)
+        posture = solve_posture(self.model, state.q, target, 2)
         servo = posture.q[7:]
         if self.config.feed_forward:
             servo = servo + self._sag(posture.q, state)
@@ -345,13 +405,13 @@ class Walker:
 
 
 _FAR = 0.03  # a landing this far from the plan was moved by a push, not by the gait's own error [m]
-_FREE = 0.0003
+_FREE = 1e-5
 _PITCH_ROW = (7, 13)  # com 3, then each sole: position 3, rotation 3 about its own x, y, z
 
 
 def walker(humanoid: Humanoid, config: WalkConfig | None = None) -> Walker:
     """A humanoid, ready to walk."""
-    return Walker(humanoid, config or WalkConfig(), observer(humanoid, posture_model(humanoid)))
+    return Walker(humanoid, config or WalkConfig(), observer(humanoid, posture_model(humanoid)), nmpc(humanoid.gait))
 
 
 def _turned(yaw: float) -> Float[np.ndarray, "3 3"]:

@@ -37,12 +37,13 @@ from toddle.walk.pattern.nmpc_problem import (
     document_weights,
     drawn_to,
     turned,
+    yaws_of,
 )
 from toddle.walk.pattern.obstacles import NONE, near
 from toddle.walk.pattern.plan import Status
 from toddle.walk.pattern.quadratic import least_distance
 
-__all__ = ["NEVER", "STILL", "Nmpc", "Plan", "PlanState", "Weights", "document_weights", "nmpc", "plan"]
+__all__ = ["NEVER", "STILL", "Nmpc", "Plan", "PlanState", "Weights", "apart", "document_weights", "nmpc", "plan"]
 
 _BROKEN = 1e-5  # a hard row may be exceeded by so much [m], [rad]
 
@@ -113,7 +114,7 @@ def _solve(
 ) -> Plan:
     """Linearised at ``guess``; which is the answer where there is no better one."""
     numbers, foot = problem.numbers, state.support
-    yaws = turned(problem, foot.yaw, velocity)
+    yaws = yaws_of(problem, state, velocity)
     drawn = drawn_to(problem, state, velocity)
     place = np.array([foot.x, foot.y, 0.0])
     com = state.com.copy()
@@ -160,7 +161,7 @@ def _from_landing(
     velocity: Velocity,
 ) -> tuple[Float[np.ndarray, " soles"], Float[np.ndarray, "steps 2"]]:
     """Yaws and displacements where the next landing is settled already: the others follow from it."""
-    after = state._replace(support=Footstep(1 - state.support.side, *landing.tolist()))
+    after = state._replace(support=Footstep(1 - state.support.side, *landing.tolist()), first=None)
     following = drawn_to(problem, after, velocity)
     yaws = np.concatenate([yaws[:1], turned(problem, float(landing[2]), velocity)[:-1]])
     return yaws, np.concatenate([drawn[:1], following[:-1]])
@@ -170,7 +171,7 @@ def nominal(problem: Nmpc, state: PlanState, velocity: Velocity) -> Plan:
     """The plan that follows from the command alone: no jerk. Numbers that aren't finite count as 0."""
     state = _usable(state)
     velocity = velocity if all(map(math.isfinite, velocity)) else STILL
-    drawn, yaws = drawn_to(problem, state, velocity), turned(problem, state.support.yaw, velocity)
+    drawn, yaws = drawn_to(problem, state, velocity), yaws_of(problem, state, velocity)
     feet = np.column_stack([np.array([state.support.x, state.support.y]) + drawn.cumsum(axis=0), yaws[1:]])
     count = problem.gait.preview
     zmp = np.repeat(np.array([[state.support.x, state.support.y]]), count, axis=0)
@@ -227,6 +228,7 @@ def _finite(state: PlanState, velocity: Velocity, circles: Float[np.ndarray, "ci
     foot, other = state.support, state.lifted
     total = foot.x + foot.y + foot.yaw + other.x + other.y + other.yaw + state.origin[0] + state.origin[1]
     total += state.phase + state.remaining + state.double_support + velocity.vx + velocity.vy + velocity.omega
+    total += sum(state.first or ())
     return math.isfinite(total + float(state.com.sum()) + (float(circles.sum()) if len(circles) else 0.0))
 
 

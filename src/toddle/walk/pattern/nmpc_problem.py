@@ -88,6 +88,8 @@ class PlanState(NamedTuple):
         remaining: until it ends [s]; any, the following steps take the gait's time.
         double_support: how long the weight takes to come over from ``origin`` [s].
         halt: the robot stands after so many landings, with both feet side by side; 0: it stands; `NEVER`.
+        first: displacement x, y [m] in the plan's frame and turn [rad] that the next landing is drawn to, where it was
+            settled before the command changed; None: the command's.
     """
 
     com: Float[np.ndarray, "2 3"]
@@ -98,6 +100,7 @@ class PlanState(NamedTuple):
     remaining: float
     double_support: float
     halt: int = NEVER
+    first: tuple[float, float, float] | None = None
 
 
 class Plan(NamedTuple):
@@ -194,10 +197,24 @@ def turned(problem: Nmpc, yaw: float, velocity: Velocity) -> Float[np.ndarray, "
     return yaw + turn * np.arange(problem.gait.steps + 1)
 
 
+def yaws_of(problem: Nmpc, state: PlanState, velocity: Velocity) -> Float[np.ndarray, " soles"]:
+    """Yaws that the soles are tied to: of the support foot and of the landings to come [rad]."""
+    if state.first is None:
+        return turned(problem, state.support.yaw, velocity)
+    most = problem.gait.longest_turn
+    first = state.support.yaw + min(max(state.first[2], -most), most)
+    return np.concatenate([[state.support.yaw], turned(problem, first, velocity)[:-1]])
+
+
 def drawn_to(problem: Nmpc, state: PlanState, velocity: Velocity) -> Float[np.ndarray, "steps 2"]:
     """Displacements by the command, each from the foot before [m]."""
     gait, foot = problem.gait, state.support
-    return np.array(displacements(apart(gait, velocity), gait.step_time, velocity, foot.side, foot.yaw, gait.steps))
+    wide = apart(gait, velocity)
+    if state.first is None:
+        return np.array(displacements(wide, gait.step_time, velocity, foot.side, foot.yaw, gait.steps))
+    yaw = foot.yaw + state.first[2]
+    later = displacements(wide, gait.step_time, velocity, 1 - foot.side, yaw, gait.steps - 1)
+    return np.array([state.first[:2], *later])
 
 
 def apart(gait: Gait, velocity: Velocity) -> float:
