@@ -111,8 +111,8 @@ def begin(gait: Gait, stance: int, foot: Pose, origin: Pair, ahead: Chain, turn:
 
 def catching(gait: Gait, stance: int, foot: Pose, origin: Pair) -> tuple[Step, tuple[Pair, ...]]:
     """A step out of standing that catches a push, and the displacements after it."""
-    ahead = chain(gait, by_command(gait, STILL, stance, foot[2]), final=True)
-    step = begin(gait, stance, foot, origin, ahead, 0.0, final=True)._replace(double_support=_CATCH_DS)
+    ahead = chain(gait, by_command(gait, STILL, stance, foot[2]), final=False)
+    step = begin(gait, stance, foot, origin, ahead, 0.0, final=False)._replace(double_support=_CATCH_DS)
     return step, ahead.displacements[1:]
 
 

@@ -50,6 +50,7 @@ from toddle.walk.stepping import (
 )
 
 _PERSISTS = 5  # so many unusable plans, one after another, end the walk
+_CALM = 0.02  # a DCM this near to where it should be lets the robot stand after one more step [m]
 _SHRUNK = 0.8  # of the soles: a DCM outside of this, while standing, calls for a step
 
 
@@ -163,11 +164,20 @@ class Walker:
 
     def _begin(self, state: WalkerState, stance: int, origin: Pair, velocity: Velocity) -> WalkerState:
         foot = _pose(state.anchors, stance)
-        final = not moving(velocity)
-        wanted = STILL if final else _sum(velocity, state.correction)
+        walks = moving(velocity)
+        wanted = _sum(velocity, state.correction) if walks else STILL
+        final = not walks and self._calm(state, foot, stance, origin)
         ahead = chain(self.gait, by_command(self.gait, wanted, stance, foot[2]), final)
         step = begin(self.gait, stance, foot, origin, ahead, wanted.omega * self.gait.step_time, final)
         return state._replace(mode=Mode.STEP, step=step, later=ahead.displacements[1:], plan_age=math.inf)
+
+    def _calm(self, state: WalkerState, foot: Pose, stance: int, origin: Pair) -> bool:
+        """Whether the robot could stand after the step that begins: its DCM is about where that asks for."""
+        ahead = chain(self.gait, by_command(self.gait, STILL, stance, foot[2]), final=True)
+        step = begin(self.gait, stance, foot, origin, ahead, 0.0, True)
+        x, y = self._dcm_of(step, ahead)
+        sensed = state.estimate
+        return sensed is None or math.hypot(float(sensed.dcm[0]) - x, float(sensed.dcm[1]) - y) < _CALM
 
     def _land(self, state: WalkerState, sensed: Estimate, velocity: Velocity) -> WalkerState:
         landed = 1 - state.step.stance
@@ -262,14 +272,20 @@ class Walker:
         x0 = rotate(-yaw, (xi[0] - foot[0] - short[0], xi[1] - foot[1] - short[1]))
         step = self._choose(step, x0, ahead)
         state = state._replace(step=step)
-        goal = aim(step, ahead, self.gait)
-        decay = math.exp(-omega * max(step.end - step.phase, 0.0))
-        at_end = [(goal.kappa * step.landing[i] + goal.rest[i]) / goal.growth for i in (0, 1)]
-        ahead_of_foot = rotate(yaw, (at_end[0] * decay, at_end[1] * decay))
-        reference_dcm = (foot[0] + short[0] + ahead_of_foot[0], foot[1] + short[1] + ahead_of_foot[1])
         share = min(step.phase / step.double_support, 1.0) if step.double_support > 0 else 1.0
         zmp = (step.origin[0] + share * came[0], step.origin[1] + share * came[1])
-        return state, zmp, reference_dcm
+        return state, zmp, self._dcm_of(step, ahead)
+
+    def _dcm_of(self, step: Step, ahead: Chain) -> Pair:
+        """Where the DCM is to be now, so that it ends the step where the next one needs it."""
+        omega, foot, yaw = self.gait.omega, step.foot[:2], step.foot[2]
+        came = (foot[0] - step.origin[0], foot[1] - step.origin[1])
+        short = pendulum.ramp(omega, came, step.double_support - step.phase, step.double_support)
+        goal = aim(step, ahead, self.gait)
+        decay = math.exp(-omega * max(step.end - step.phase, 0.0))
+        at_end = [decay * (goal.kappa * step.landing[i] + goal.rest[i]) / goal.growth for i in (0, 1)]
+        beyond = rotate(yaw, (at_end[0], at_end[1]))
+        return foot[0] + short[0] + beyond[0], foot[1] + short[1] + beyond[1]
 
     def _choose(self, step: Step, x0: Pair, ahead: Chain) -> Step:
         """The step with its landing adjusted."""

@@ -6,7 +6,6 @@ the environment is that many of its ticks under one command.
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
@@ -17,13 +16,13 @@ import gymnasium
 import numpy as np
 from gymnasium.error import ResetNeeded
 from jaxtyping import Float, Float32, UInt8
-from numpy.typing import ArrayLike
 
 from toddle.failures import BadInput, unknown_name
 from toddle.outside.environment import WALK
+from toddle.outside.environment.asked import Numbers, draws, velocity_of, whole_ticks
 from toddle.outside.environment.observation import layout, observe
 from toddle.outside.environment.tracking import Place, mean_velocity, reward
-from toddle.outside.simulation.disturbances import SILENT, TICK, WorldOptions
+from toddle.outside.simulation.disturbances import TICK, WorldOptions
 from toddle.outside.simulation.humanoid import HumanoidSimulation, Truth
 from toddle.outside.simulation.pictures import Camera
 from toddle.robots.humanoids import load_humanoid
@@ -56,7 +55,7 @@ class WalkEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         robot_config: str | None = None,
         world: WorldOptions | None = None,
         config: WalkConfig | None = None,
-        goal: ArrayLike | None = None,
+        goal: Numbers | None = None,
         seconds: float = 20.0,
         step_seconds: float = 0.1,
         render_mode: str | None = None,
@@ -84,7 +83,7 @@ class WalkEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise unknown_name("render mode", str(render_mode), self.metadata["render_modes"], where=WALK)
-        self._ticks, self._seconds = _ticks(step_seconds), seconds
+        self._ticks, self._seconds = whole_ticks(step_seconds), seconds
         if not seconds >= step_seconds:
             raise BadInput(
                 f"{seconds} s is no time", where=f"{WALK}, seconds", remedy=f"give {step_seconds:g} s or more"
@@ -99,7 +98,7 @@ class WalkEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.render_mode = render_mode
         self.simulation = HumanoidSimulation(self.humanoid, world)
         self._world, self._walker = self.simulation.options, walker(self.humanoid, config)
-        self._always = None if goal is None else self._checked(goal, "goal")
+        self._always = None if goal is None else self._allowed(goal)
         self.goal = self._always or STILL
         self._view, self._camera = (width, height, view), None
         self._moments: Iterator[Moment] | None = None
@@ -122,14 +121,15 @@ class WalkEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         Raises:
             BadInput: an option that isn't known, or a goal out of range.
         """
-        super().reset(seed=seed)
         told = dict(options or {})
         goal = told.pop("goal", None)
         if told:
             raise unknown_name("option", str(next(iter(told))), ["goal"], where=f"{WALK}, reset")
+        asked = self._always if goal is None else self._allowed(goal)
+        super().reset(seed=seed)
         world, drawn = int(self.np_random.integers(_SEEDS)), self.np_random.uniform(-1.0, 1.0, 3)
-        self.goal = self._goal(goal, drawn)
-        if _draws(self._world):
+        self.goal = asked or Velocity(*(drawn * self.humanoid.gait.fastest).tolist())
+        if draws(self._world):
             self._forget()
             self.simulation = HumanoidSimulation(self.humanoid, replace(self._world, seed=world))
         self._command, self._support, self._since, self._fallbacks = STILL, -1, 0.0, 0
@@ -140,7 +140,7 @@ class WalkEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._ended = False
         return self._seen(moment), self._info(moment, self._look())
 
-    def step(self, action: ArrayLike) -> tuple[Float32[np.ndarray, " numbers"], float, bool, bool, dict[str, Any]]:
+    def step(self, action: Numbers) -> tuple[Float32[np.ndarray, " numbers"], float, bool, bool, dict[str, Any]]:
         """Walk for ``step_seconds`` under a command.
 
         Args:
@@ -155,7 +155,7 @@ class WalkEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             BadInput: the action has the wrong shape, or isn't finite; nothing has moved.
             ResetNeeded: the episode is over, or hasn't begun.
         """
-        command = _velocity(action, "action")
+        command = velocity_of(action, "action")
         if self._moments is None or self._ended:
             raise ResetNeeded("the episode is over, or hasn't begun: call reset()")
         self._command = command
@@ -190,18 +190,8 @@ class WalkEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             self._camera.close()
             self._camera = None
 
-    def _goal(self, told: ArrayLike | None, drawn: Float[np.ndarray, "3"]) -> Velocity:
-        if told is not None:
-            return self._checked(told, "goal")
-        return self._always or Velocity(*(drawn * self.humanoid.gait.fastest).tolist())
-
-    def _checked(self, numbers: ArrayLike, what: str) -> Velocity:
-        velocity = _velocity(numbers, what)
-        fastest = self.humanoid.gait.fastest
-        if any(abs(number) > most for number, most in zip(velocity, fastest, strict=True)):
-            most = ", ".join(f"{number:g}" for number in fastest)
-            raise BadInput(f"{tuple(velocity)} is too fast", where=f"{WALK}, {what}", remedy=f"at most {most}")
-        return velocity
+    def _allowed(self, goal: Numbers) -> Velocity:
+        return velocity_of(goal, "goal", self.humanoid.gait.fastest)
 
     def _walk(self, ticks: int) -> Moment:
         """So many ticks, fewer if the robot falls."""
@@ -257,31 +247,3 @@ class _Felt:
         """Command the servos and let 10 ms pass."""
         self.senses = self._simulation.tick(servo)
         return self.senses
-
-
-def _ticks(step_seconds: float) -> int:
-    ticks = step_seconds / TICK
-    if not (math.isfinite(ticks) and ticks > 0.5 and abs(ticks - round(ticks)) < 1e-9):
-        raise BadInput(
-            f"{step_seconds} s is no multiple of {TICK:g} s", where=f"{WALK}, step_seconds", remedy="round it"
-        )
-    return round(ticks)
-
-
-def _velocity(numbers: ArrayLike, what: str) -> Velocity:
-    try:
-        array = np.asarray(numbers, float)
-    except (TypeError, ValueError):
-        array = np.full(0, math.nan)
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise BadInput(
-            f"{numbers!r} is no velocity",
-            where=f"{WALK}, {what}",
-            remedy="give three finite numbers: ahead [m/s], to the left [m/s], turning left [rad/s]",
-        )
-    return Velocity(*array.tolist())
-
-
-def _draws(world: WorldOptions) -> bool:
-    """Whether a world is another one by another seed."""
-    return world.noise != SILENT or world.bias != SILENT or bool(world.bumps or world.mass_error)
