@@ -177,7 +177,7 @@ class WalkEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if self.render_mode is None:
             return None
         if self._camera is None:
-            self._camera = Camera(self.simulation, *self._view)
+            self._camera = Camera(self.simulation, *self._view, shadows=False)
         return self._camera.picture()
 
     def close(self) -> None:
