@@ -46,7 +46,7 @@ class Walk:
         push: push the chest: N.s@t, such as 6@5 for 6 N s at 5 s, or 6@5@90 towards the left; may be given again.
         obstacle: a tall cylinder: x, y and radius [m]; may be given again.
         pattern_only: make the walking pattern without a body, in no time.
-        weights: of the walking pattern: ours, or those that the document prints.
+        weights: of the walking pattern: ours, or the document's, with its timing and its open loop.
         deadline: an iteration of the pattern that takes longer is not used [ms].
         config: a TOML file that says what a humanoid's description leaves out.
         noise: of the sensors; 1 for those of a good robot.
@@ -147,8 +147,6 @@ def _check(asked: Walk) -> None:
         for name in _OF_A_BODY:
             if getattr(asked, name):
                 raise BadInput("a pattern has no body", where=_flag(name), remedy="leave it or --pattern-only out")
-    elif asked.weights == "document":
-        raise BadInput("they are for the pattern alone", where="--weights document", remedy="add --pattern-only")
     for x, y, radius in asked.obstacle:
         if not 0.001 <= radius <= _FARTHEST or max(abs(x), abs(y)) > _FARTHEST:
             what = f"{x:g} {y:g} {radius:g} is out of range"

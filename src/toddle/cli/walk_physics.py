@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from toddle.cli.run_folder import new_folder
 from toddle.cli.walk_folder import leave, tell
-from toddle.failures import ToddleError
+from toddle.failures import BadInput, ToddleError
 
 if TYPE_CHECKING:
     from toddle.cli.walk import Task, Walk
@@ -22,8 +22,10 @@ if TYPE_CHECKING:
     from toddle.outside.teleoperation.keys import Keyboard
     from toddle.outside.walk_run import Watch
     from toddle.robots.gait import Gait
+    from toddle.robots.humanoid import Humanoid
     from toddle.signals import Velocity
-    from toddle.walk.loop import Moment
+    from toddle.walk.follower import Follower
+    from toddle.walk.loop import Moment, Walks
     from toddle.walk.walker import Walker
 
 _STOPPED = 130
@@ -38,16 +40,16 @@ def walk_in_physics(asked: Walk) -> int:
     from toddle.outside.walk_run import Watch, warm_up
     from toddle.outside.walk_trajectory import write_trajectory
     from toddle.robots.humanoids import load_humanoid
-    from toddle.walk.walker import walker
 
     spec = asked.robot or DEFAULT_ROBOT
     humanoid = load_humanoid(spec, asked.config)
     for note in humanoid.notes:
         print(f"{humanoid.name}: {note}", file=sys.stderr)
-    task = task_of(asked, humanoid.gait)
-    tell_capped(task, _capped(humanoid.gait), humanoid.name)
+    walks = _walks(asked, spec, humanoid)
+    task = task_of(asked, walks.gait)
+    tell_capped(task, _capped(walks.gait), humanoid.name)
     options = _world(asked, task)
-    walks, simulation = walker(humanoid, _walk_config(asked)), HumanoidSimulation(humanoid, options)
+    simulation = HumanoidSimulation(humanoid, options)
     folder = new_folder(asked.out, f"walk-{humanoid.name}")
     warm_up(walks, simulation)
     recorder = Recorder()
@@ -62,10 +64,10 @@ def walk_in_physics(asked: Walk) -> int:
     figures = {
         "robot": humanoid.name,
         "scenario": task.name,
-        **figures_of(record, humanoid.gait, until=until, wall=watch.wall),
+        **figures_of(record, walks.gait, until=until, wall=watch.wall),
         "touched": bool(simulation.touched.any()) if task.circles else None,
     }
-    leave(folder, record, humanoid.gait, figures, _config(asked, task, walks, options), task.circles)
+    leave(folder, record, walks.gait, figures, _config(asked, task, walks, options), task.circles)
     tell(figures, folder, as_json=asked.json)
     if record.fell:
         print(f"toddle: {humanoid.name} fell after {record.t[-1]:.1f} s", file=sys.stderr)
@@ -81,7 +83,7 @@ def _capped(gait: Gait) -> Callable[[Velocity], Velocity]:
 
 
 def _walk(
-    task: Task, walks: Walker, simulation: HumanoidSimulation, watch: Watch, film: Callable[[float], None]
+    task: Task, walks: Walker | Follower, simulation: HumanoidSimulation, watch: Watch, film: Callable[[float], None]
 ) -> tuple[float, bool]:
     """Walk to the end: until when it was commanded [s], and whether somebody interrupted it."""
     from toddle.outside.teleoperation.commands import follow, until
@@ -112,7 +114,7 @@ def _for(keyboard: Keyboard, seconds: float) -> Callable[[float], Any]:
 
 
 def _moments(
-    task: Task, walks: Walker, simulation: HumanoidSimulation, heard: Callable[[float], Any]
+    task: Task, walks: Walks[Any], simulation: HumanoidSimulation, heard: Callable[[float], Any]
 ) -> Iterator[Moment]:
     """The walk; pushes are told to the world once it has begun, since that forgets them at the start."""
     from toddle.walk.loop import walk
@@ -124,7 +126,9 @@ def _moments(
         yield moment
 
 
-def _shown(stack: ExitStack, task: Task, walks: Walker, keyboard: Keyboard | None) -> Callable[[Moment], None]:
+def _shown(
+    stack: ExitStack, task: Task, walks: Walker | Follower, keyboard: Keyboard | None
+) -> Callable[[Moment], None]:
     """What tells a person how the walk goes: a panel for who drives, a bar for who waits."""
     from toddle.outside.teleoperation.keys import HELP
     from toddle.outside.teleoperation.panel import Panel
@@ -199,13 +203,31 @@ def _world(asked: Walk, task: Task) -> WorldOptions:
     return WorldOptions(**known, noise=noise, circles=task.circles, seed=asked.seed)
 
 
-def _walk_config(asked: Walk) -> Any:
-    from toddle.walk.config import WalkConfig
+def _walks(asked: Walk, spec: str, humanoid: Humanoid) -> Walker | Follower:
+    """Our walker, or the document's.
 
-    return WalkConfig(deadline_ms=asked.deadline)
+    Raises:
+        BadInput: the document's is asked for, and the robot does not occur there.
+    """
+    if asked.weights == "default":
+        from toddle.walk.config import WalkConfig
+        from toddle.walk.walker import walker
+
+        return walker(humanoid, WalkConfig(deadline_ms=asked.deadline))
+    from toddle.robots.catalogue import HUMANOIDS
+    from toddle.walk.follower import FollowerConfig, follower
+
+    known = HUMANOIDS.get(spec)
+    if known is None or known.document_gait is None:
+        raise BadInput(
+            f"the document does not say how {humanoid.name} walks",
+            where="--weights document",
+            remedy="take heicub, or add --pattern-only",
+        )
+    return follower(humanoid, known.document_gait, FollowerConfig(deadline_ms=asked.deadline))
 
 
-def _config(asked: Walk, task: Task, walks: Walker, options: WorldOptions) -> dict[str, Any]:
+def _config(asked: Walk, task: Task, walks: Walker | Follower, options: WorldOptions) -> dict[str, Any]:
     """What a reader needs to make the same again."""
     return {
         "robot": asked.robot or walks.humanoid.name,

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from toddle.outside.simulation.disturbances import TICK
 from toddle.outside.simulation.humanoid import HumanoidSimulation
@@ -15,9 +16,8 @@ from toddle.outside.teleoperation.commands import Source, follow
 from toddle.outside.video import Film
 from toddle.outside.walk_record import Recorder
 from toddle.signals import Velocity
-from toddle.walk.loop import Moment, walk
+from toddle.walk.loop import Moment, Walks, walk
 from toddle.walk.scenarios import Leg
-from toddle.walk.walker import Walker
 
 _FRAMES, _FRAMES_SLOW = 25, 12  # pictures a second
 _BEGINNING = 20.0  # of a walk [s]
@@ -109,7 +109,7 @@ class Filming:
             self._film.add(self._camera.picture())
 
 
-def warm_up(walker: Walker, simulation: HumanoidSimulation) -> None:
+def warm_up(walker: Walks[Any], simulation: HumanoidSimulation) -> None:
     """Call everything once, so that no compiler interrupts the walk; the robot stands at its start again."""
     source = follow((Leg(0.0, Velocity(0.05, 0.0, 0.0)),), _WARM * TICK)
     for _ in islice(walk(walker, simulation, source), _WARM):

@@ -7,27 +7,30 @@ time. Nothing here knows who they are.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, NamedTuple, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
 
+from toddle.robots.gait import Gait
 from toddle.signals import Circle, Reference, Senses, Velocity
 from toddle.walk.balance import support
+from toddle.walk.balance.estimate import Estimate
 from toddle.walk.config import TICK
 from toddle.walk.gate import STILL, gate
-from toddle.walk.state import Mode, WalkerState
+from toddle.walk.state import Action, Landing, Mode
 from toddle.walk.stepping import achieved
-from toddle.walk.walker import Walker
 
 if TYPE_CHECKING:
     from toddle.walk.pattern.nmpc import Plan
+    from toddle.walk.pattern.plan import Interval
 
 CommandSource = Callable[[float], Velocity | None]
 """The velocity asked for at a time [s]; None: it has ended, and the robot is to stand."""
 
 _FALLEN = 0.8  # tilt of the waist from which nothing brings it back [rad]
-_STOPPING = 8.0  # the most that a stop may take [s]
+_STOPPING = 8.0  # the most that a stop may take [s] ...
+_STOPPING_STEPS = 5  # ... or so many steps, where they take longer
 
 
 @runtime_checkable
@@ -40,6 +43,79 @@ class Robot(Protocol):
 
     def tick(self, servo: Float[np.ndarray, " joints"]) -> Senses:
         """Command the servos and let 10 ms pass."""
+        ...
+
+
+class Stride(Protocol):
+    """The step that a walker is in."""
+
+    @property
+    def stance(self) -> int:
+        """The side that carries."""
+        ...
+
+    @property
+    def double_support(self) -> float:
+        """How long both do [s]."""
+        ...
+
+    @property
+    def phase(self) -> float:
+        """Time since it began [s]."""
+        ...
+
+
+class State(Protocol):
+    """What the loop reads of a walker's state."""
+
+    @property
+    def t(self) -> float:
+        """Time [s]."""
+        ...
+
+    @property
+    def mode(self) -> Mode:
+        """What the feet do."""
+        ...
+
+    @property
+    def step(self) -> Stride:
+        """The step under way, or the last one."""
+        ...
+
+    @property
+    def landings(self) -> tuple[Landing, ...]:
+        """The last three touchdowns."""
+        ...
+
+    @property
+    def estimate(self) -> Estimate | None:
+        """What the senses told."""
+        ...
+
+
+S = TypeVar("S", bound=State)
+
+
+@runtime_checkable
+class Walks(Protocol[S]):
+    """Who decides: a `toddle.walk.walker.Walker` or a `toddle.walk.follower.Follower`."""
+
+    @property
+    def gait(self) -> Gait:
+        """How it steps."""
+        ...
+
+    def start(self) -> S:
+        """Standing at home."""
+        ...
+
+    def step(self, state: S, velocity: Velocity, senses: Senses, circles: tuple[Circle, ...] = ()) -> tuple[S, Action]:
+        """One tick of 10 ms."""
+        ...
+
+    def area(self, state: S) -> support.Corners:
+        """The area of the soles that stand, counter-clockwise."""
         ...
 
 
@@ -87,14 +163,14 @@ class Moment(NamedTuple):
     allowed: Velocity
     reference: Reference
     measured: Measured
-    plan: Plan | None
+    plan: Plan | Interval | None
     posture_ms: float
     support: int
     fell: bool
 
 
 def walk(
-    walker: Walker,
+    walker: Walks[S],
     robot: Robot,
     commands: CommandSource,
     seconds: float | None = None,
@@ -116,12 +192,13 @@ def walk(
     """
     senses, state, allowed = robot.reset(), walker.start(), STILL
     ended: float | None = None
+    stopping = max(_STOPPING, _STOPPING_STEPS * walker.gait.step_time)
     while seconds is None or state.t < seconds - TICK / 2:
         asked = None if ended is not None else commands(state.t)
         if asked is None and ended is None:
             ended = state.t
         stands = state.mode == Mode.STAND and allowed == STILL
-        if ended is not None and (stands or state.t - ended > _STOPPING):
+        if ended is not None and (stands or state.t - ended > stopping):
             return
         command = STILL if asked is None else asked
         allowed = gate(allowed, command, walker.gait.fastest, TICK, limited=limited)
@@ -137,11 +214,11 @@ def walk(
             return
 
 
-def _single(state: WalkerState) -> bool:
+def _single(state: State) -> bool:
     return state.mode == Mode.STEP and state.step.phase >= state.step.double_support
 
 
-def _measured(walker: Walker, state: WalkerState) -> Measured:
+def _measured(walker: Walks[S], state: S) -> Measured:
     sensed = state.estimate
     assert sensed is not None
     velocity = achieved(state.landings) if len(state.landings) > 2 else Velocity(np.nan, np.nan, np.nan)

@@ -17,6 +17,7 @@ from toddle.walk.balance.pendulum import Pair
 if TYPE_CHECKING:
     from toddle.walk.balance.estimate import Estimate
     from toddle.walk.pattern.nmpc import Plan
+    from toddle.walk.pattern.plan import Interval
 
 Pose = tuple[float, float, float]
 
@@ -134,7 +135,7 @@ class Action(NamedTuple):
     servo: Float[np.ndarray, " joints"]
     reference: Reference
     estimate: Estimate
-    plan: Plan | None
+    plan: Plan | Interval | None
     posture_ms: float
     posture_residual: float
     velocity: Velocity
