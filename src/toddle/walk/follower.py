@@ -47,13 +47,15 @@ class FollowerConfig:
     Attributes:
         feed_forward: servos are commanded ahead by the torque that they have to hold.
         feedback: share of the measured centre of mass, place and velocity, in what an iteration begins with.
-        shift_time: of the weight shift before the first step and after the last [s].
+        shift_time: of the weight shift before the first step [s].
+        stop_time: of the one after the last step, which begins in full motion [s].
         deadline_ms: an iteration that takes longer is not used; None: no deadline.
     """
 
     feed_forward: bool = True
     feedback: float = 0.0
     shift_time: float = 2.0
+    stop_time: float = 0.8
     deadline_ms: float | None = None
 
     def __post_init__(self) -> None:
@@ -62,11 +64,10 @@ class FollowerConfig:
         Raises:
             BadInput: a share beyond 0 to 1, or no time.
         """
-        for name, fits in (("feedback", 0 <= self.feedback <= 1), ("shift_time", self.shift_time > TICK)):
-            if not fits:
-                raise BadInput(
-                    f"{getattr(self, name)} is no use", where=f"follower option {name}", remedy="give 0 to 1, or a time"
-                )
+        if not 0 <= self.feedback <= 1:
+            raise BadInput(f"{self.feedback} is no share", where="follower option feedback", remedy="give 0 to 1")
+        if not min(self.shift_time, self.stop_time) > TICK:
+            raise BadInput("there is no time", where="follower options shift_time, stop_time", remedy="give seconds")
 
 
 class Stride(NamedTuple):
@@ -195,7 +196,7 @@ class Follower:
                 return state
             return self._shift(state._replace(landings=()), _pose(state.anchors, LEFT), self._aside(), Mode.STEP)
         if state.mode == Mode.SHIFT:
-            if state.since < self.config.shift_time - _ROUNDING:
+            if state.since < self._shift_time(state) - _ROUNDING:
                 return state
             com = np.zeros((2, 3))
             com[:, 0] = state.goal
@@ -229,6 +230,9 @@ class Follower:
         x, y, yaw = pose
         goal = (x - aside * math.sin(yaw), y + aside * math.cos(yaw))
         return state._replace(mode=Mode.SHIFT, since=0.0, goal=goal, next=then, interval=None)
+
+    def _shift_time(self, state: FollowerState) -> float:
+        return self.config.stop_time if state.next == Mode.STAND else self.config.shift_time
 
     def _first(self, state: FollowerState) -> FollowerState:
         """The pattern begins anew from where the robot stands."""
@@ -270,9 +274,8 @@ class Follower:
     def _reference(self, state: FollowerState) -> Reference:
         motion, feet = state.com, state.feet
         if state.mode == Mode.SHIFT:
-            time_left = self.config.shift_time
-            path = quintic(np.ascontiguousarray(state.com.T), np.array(state.goal), time_left)
-            motion = np.ascontiguousarray(evaluate(path, min(state.since, time_left)).T)
+            path = quintic(np.ascontiguousarray(state.com.T), np.array(state.goal), self._shift_time(state))
+            motion = np.ascontiguousarray(evaluate(path, state.since).T)
         elif state.interval is not None:
             motion = advance(state.interval.com, state.interval.jerk, state.since)
             feet = swing(self.gait, state.interval, state.feet, state.since)
