@@ -144,15 +144,17 @@ def _iterate(problem: _Scaled, u: Float[Array, " unknowns"], sides: _Sides) -> t
 
     gap = _gap(problem, sides)
     _, ahead = direction(room * force)
-    length = _longest(sides, ahead)
+    length = jnp.minimum(_longest(sides, ahead), 1.0)
     tried = _gap(problem, _Sides(room + length * ahead.room, force + length * ahead.force))
     centre = (tried / jnp.maximum(gap, jnp.finfo(u.dtype).tiny)) ** 3 * gap
     du, change = direction(room * force + ahead.room * ahead.force - centre)
-    length = _NEAR * _longest(sides, change)
+    length = jnp.minimum(_NEAR * _longest(sides, change), 1.0)
     return u + length * du, _Sides(room + length * change.room, force + length * change.force)
 
 
-def _inverse_root(matrix: Float[Array, "rows unknowns"], weight: Float[Array, " rows"]) -> Float[Array, "unknowns unknowns"]:
+def _inverse_root(
+    matrix: Float[Array, "rows unknowns"], weight: Float[Array, " rows"]
+) -> Float[Array, "unknowns unknowns"]:
     """X with X X' the inverse of I + M' diag(weight) M.
 
     In single precision by two Cholesky factorisations, the first of a matrix with a larger diagonal, the second of what
@@ -181,7 +183,7 @@ def _times(a: Float[Array, "..."], b: Float[Array, "..."]) -> Float[Array, "..."
 
 
 def _longest(sides: _Sides, change: _Sides) -> Float[Array, ""]:
-    """The step, at most 1, that stays within the bounds."""
+    """The step that reaches the boundary."""
     values, changes = jnp.stack(sides), jnp.stack(change)
     ratios = jnp.where(changes < 0, -values / jnp.where(changes < 0, changes, -1.0), jnp.inf)
-    return jnp.minimum(ratios.min(), 1.0)
+    return ratios.min()
