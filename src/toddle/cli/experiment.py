@@ -33,6 +33,7 @@ class Ask:
         full: as the document did.
         seeds: runs of each kind; the experiment's own number unless given.
         seed: of all randomness.
+        data: a folder with files of the document's author, which an experiment sets beside ours where it can.
         out: the folder to leave; runs/NAME unless given.
         json: print one JSON object with the figures, and nothing else.
     """
@@ -42,6 +43,7 @@ class Ask:
     full: bool = False
     seeds: int | None = None
     seed: int = 0
+    data: Path | None = None
     out: Path | None = None
     json: bool = False
 
@@ -71,6 +73,8 @@ def _check(asked: Ask) -> None:
     """Refuse what contradicts itself before anything heavy is imported."""
     if asked.quick and asked.full:
         raise BadInput("--quick and --full exclude each other", where="toddle experiment", remedy="give one")
+    if asked.data is not None and not asked.data.is_dir():
+        raise BadInput("it is no folder", where=f"--data {asked.data}", remedy="give the folder of the author's files")
     if asked.seeds is not None and not 1 <= asked.seeds <= _MOST_SEEDS:
         raise BadInput(f"{asked.seeds} is out of range", where="--seeds", remedy=f"give 1 to {_MOST_SEEDS}")
     if not 0 <= asked.seed < 2**32:
@@ -103,6 +107,7 @@ def _run(experiment: Experiment, asked: Ask, folder: Path) -> tuple[Outcome, boo
             folder=folder,
             tell=lambda done, news: reporter.tell(round(100 * done), news),
             stopped=lambda: stop.asked,
+            data=asked.data,
         )
         outcome = experiment.run(task)
         return outcome, stop.asked, time.perf_counter() - began

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from toddle.experiments.experiment import Experiment
 
 NAMES = (
+    "huber-patterns",
+    "huber-zmp",
     "mahboob-hyperparameters",
     "mahboob-nicu",
     "mahboob-slp-mlp",

@@ -19,6 +19,7 @@ class Task:
         folder: where its pictures go.
         tell: called with how much is done (0 to 1) and what is new.
         stopped: whether somebody asked to stop; what is there is then evaluated.
+        data: a folder with files of the document's author, to be set beside ours; None: they are left out.
     """
 
     full: bool
@@ -27,6 +28,7 @@ class Task:
     folder: Path
     tell: Callable[[float, str], None]
     stopped: Callable[[], bool]
+    data: Path | None = None
 
     def part(self, begins: float, ends: float) -> Task:
         """The same task for a part of the work, which lies between these shares of the whole."""

@@ -1,4 +1,4 @@
-"""Pictures that set an experiment beside its document: heat maps, scatter, bars with deviations, courses."""
+"""Pictures that set an experiment beside its document: heat maps, scatter, bars with deviations, courses, ways."""
 
 from __future__ import annotations
 
@@ -120,4 +120,15 @@ def discovery(path: Path, positions: Mapping[str, Float[np.ndarray, "_ space"]],
         axes.set(xlim=(-1.05, 1.05), ylim=(-1.05, 1.05), xlabel="x [m]")
         axes.set_title(name, fontsize=8)
     figure.suptitle(title, fontsize=10)
+    save_figure(figure, path)
+
+
+def paths_beside(path: Path, lines: Mapping[str, Float[np.ndarray, "_ 2"]], *, title: str) -> None:
+    """Ways in the plane [m] drawn over each other, seen from above (figures 4.1, 4.2 of Huber 2019)."""
+    figure = new_figure(9.0, 4.2)
+    axes = plain_axes(figure)
+    for k, (name, way) in enumerate(lines.items()):
+        axes.plot(*way.T, lw=1.4, color=(OURS, THEIRS, INK)[k % 3], ls=("-", "--", ":")[k % 3], label=name)
+    axes.set(xlabel="x [m]", ylabel="y [m]", title=title)
+    axes.legend(frameon=False)
     save_figure(figure, path)
