@@ -46,6 +46,7 @@ class Robot(Protocol):
         ...
 
 
+@runtime_checkable
 class Stride(Protocol):
     """The step that a walker is in."""
 
@@ -65,6 +66,7 @@ class Stride(Protocol):
         ...
 
 
+@runtime_checkable
 class State(Protocol):
     """What the loop reads of a walker's state."""
 
