@@ -80,7 +80,7 @@ def test_a_goal_that_is_walled_in_makes_it_stand() -> None:
 
 def test_a_narrow_gap_is_taken_where_there_is_no_other() -> None:
     """A ring of posts around the start, closed but for one gap, too narrow for the clearance that is wished."""
-    ring = tuple(Circle(1.5 * math.cos(a), 1.5 * math.sin(a), 0.2) for a in np.arange(26, 345, 12) * math.pi / 180)
+    ring = tuple(Circle(1.5 * math.cos(a), 1.5 * math.sin(a), 0.2) for a in np.radians(np.linspace(22, 338, 27)))
     arrived, way = walked(guide(ring, (3.0, 0.0)), (0.0, 0.0, 2.0))
     assert arrived
     assert 0.25 < gap(way, ring) < 0.39

@@ -1,0 +1,1 @@
+"""The campaign that proves the walker, in physics: ``python -m benchmarks.walking``."""
