@@ -78,7 +78,7 @@ WORDS: dict[str, tuple[tuple[str, ...], str]] = {
     "driving a pattern": (("--pattern-only", "--keys"), "a pattern has no body"),
     "filming a pattern": (("--pattern-only", "--video"), "a pattern has no body"),
     "a noisy pattern": (("--pattern-only", "--noise", "1"), "a pattern has no body"),
-    "the document's weights on a body": (("--weights", "document"), "add --pattern-only"),
+    "a robot that the document does not know": (("icub", "--weights", "document"), "take heicub"),
     "a misspelt option": (("--comand", "0", "0", "0"), "did you mean --command"),
     "for_": (("--for_", "5"), "did you mean --for"),
 }

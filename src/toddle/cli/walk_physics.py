@@ -42,10 +42,11 @@ def walk_in_physics(asked: Walk) -> int:
     from toddle.robots.humanoids import load_humanoid
 
     spec = asked.robot or DEFAULT_ROBOT
+    document = _document_gait(asked, spec)
     humanoid = load_humanoid(spec, asked.config)
     for note in humanoid.notes:
         print(f"{humanoid.name}: {note}", file=sys.stderr)
-    walks = _walks(asked, spec, humanoid)
+    walks = _walks(asked, humanoid, document)
     task = task_of(asked, walks.gait)
     tell_capped(task, _capped(walks.gait), humanoid.name)
     options = _world(asked, task)
@@ -203,28 +204,33 @@ def _world(asked: Walk, task: Task) -> WorldOptions:
     return WorldOptions(**known, noise=noise, circles=task.circles, seed=asked.seed)
 
 
-def _walks(asked: Walk, spec: str, humanoid: Humanoid) -> Walker | Follower:
-    """Our walker, or the document's.
-
-    Raises:
-        BadInput: the document's is asked for, and the robot does not occur there.
-    """
-    if asked.weights == "default":
+def _walks(asked: Walk, humanoid: Humanoid, document: Gait | None) -> Walker | Follower:
+    """Our walker, or the document's, where its gait is given."""
+    if document is None:
         from toddle.walk.config import WalkConfig
         from toddle.walk.walker import walker
 
         return walker(humanoid, WalkConfig(deadline_ms=asked.deadline))
-    from toddle.robots.catalogue import HUMANOIDS
     from toddle.walk.follower import FollowerConfig, follower
 
-    known = HUMANOIDS.get(spec)
-    if known is None or known.document_gait is None:
-        raise BadInput(
-            f"the document does not say how {humanoid.name} walks",
-            where="--weights document",
-            remedy="take heicub, or add --pattern-only",
-        )
-    return follower(humanoid, known.document_gait, FollowerConfig(deadline_ms=asked.deadline))
+    return follower(humanoid, document, FollowerConfig(deadline_ms=asked.deadline))
+
+
+def _document_gait(asked: Walk, spec: str) -> Gait | None:
+    """How the robot walks in Huber 2019, if that is asked for.
+
+    Raises:
+        BadInput: it does not occur there.
+    """
+    from toddle.robots.catalogue import HUMANOIDS
+
+    if asked.weights == "default":
+        return None
+    gait = HUMANOIDS[spec].document_gait if spec in HUMANOIDS else None
+    if gait is None:
+        what = f"the document does not say how {spec} walks"
+        raise BadInput(what, where="--weights document", remedy="take heicub, or add --pattern-only")
+    return gait
 
 
 def _config(asked: Walk, task: Task, walks: Walker | Follower, options: WorldOptions) -> dict[str, Any]:

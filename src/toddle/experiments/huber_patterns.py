@@ -163,10 +163,11 @@ def _author(path: Path) -> tuple[Float[np.ndarray, "rows 2"], Float[np.ndarray, 
     """x and y of the centre of mass, and the soles' heights, in a trajectory of the author's C++ program [m]."""
     remedy = "give the folder of the author's cpp_nmpc_straight.csv and cpp_nmpc_turn.csv"
     try:
-        rows = np.loadtxt(path, delimiter=",", ndmin=2)
+        lines = path.read_text().splitlines()
+        rows = np.array([[float(word) for word in line.split(",")] for line in lines if line.strip()], dtype=float)
     except (OSError, ValueError) as fault:
         raise BadInput(f"it can't be read: {str(fault)[:80]}", where=str(path), remedy=remedy) from None
-    if len(rows) < 2 or rows.shape[1] < 21 or not np.isfinite(rows[:, [0, 3, 15, 19]]).all():
+    if rows.ndim != 2 or len(rows) < 2 or rows.shape[1] < 21 or not np.isfinite(rows[:, [0, 3, 15, 19]]).all():
         raise BadInput("it is no trajectory of 21 columns", where=str(path), remedy=remedy)
     return rows[:, [0, 3]], rows[:, [15, 19]]
 
