@@ -37,15 +37,20 @@ def main() -> None:
     out = asked.out or (quick_out if asked.quick else ROOT / "benchmarks" / "results")
     out.mkdir(parents=True, exist_ok=True)
     single_threaded()
+    failed = False
     for name in asked.parts or PARTS:
         if name != REPORT:
             options = " --quick" if asked.quick else ""
             command = f"python -m benchmarks.walking {name}{options} --workers {asked.workers}"
-            run_part(PARTS[name], out, workers=asked.workers, quick=asked.quick, again=asked.again, command=command)
+            content = run_part(
+                PARTS[name], out, workers=asked.workers, quick=asked.quick, again=asked.again, command=command
+            )
+            failed |= bool(content["failed"])
     if not asked.quick:
         from benchmarks.walking.report import write_report
 
         write_report(out, ROOT / "docs")
+    raise SystemExit(failed)
 
 
 if __name__ == "__main__":

@@ -54,7 +54,7 @@ class Part:
 
 
 def run_part(part: Part, out: Path, *, workers: int, quick: bool, again: bool, command: str) -> dict[str, Any]:
-    """Run what isn't done of a part; returns what its file holds."""
+    """Run what isn't done of a part; returns what its file holds. A case that raises is told and left out."""
     path = out / f"walking_{part.name}.json"
     cases = part.cases(quick)
     head = {
@@ -71,7 +71,7 @@ def run_part(part: Part, out: Path, *, workers: int, quick: bool, again: bool, c
     done = {} if again else kept(path, head["source"], cases)
     waiting = [case for case in cases if case["name"] not in done]
     print(f"{part.name}: {len(cases)} cases, {len(done)} of them done before", flush=True)
-    began, content = time.perf_counter(), {}
+    began, content, failed = time.perf_counter(), {}, {}
 
     def keep() -> None:
         rows = {case["name"]: done[case["name"]] for case in cases if case["name"] in done}
@@ -79,6 +79,7 @@ def run_part(part: Part, out: Path, *, workers: int, quick: bool, again: bool, c
             head,
             date=datetime.now(UTC).date().isoformat(),
             complete=len(rows) == len(cases),
+            failed=failed,
             cpu_seconds=round(sum(row["cpu_seconds"] for row in rows.values()), 1),
             summary=part.summary(rows) if rows else {},
             cases=[case | {"row": rows[case["name"]]} for case in cases if case["name"] in rows],
@@ -91,12 +92,15 @@ def run_part(part: Part, out: Path, *, workers: int, quick: bool, again: bool, c
         futures = {pool.submit(timed, part.run, case): case for case in waiting}
         try:
             for number, future in enumerate(as_completed(futures), start=1):
-                case = futures[future]
-                done[case["name"]] = future.result()
+                name = futures[future]["name"]
+                if (fault := future.exception()) is None:
+                    done[name] = future.result()
+                    told = ", ".join(f"{key} {done[name].get(key)}" for key in part.told)
+                else:
+                    failed[name] = told = f"{type(fault).__name__}: {fault}"
                 keep()
                 left = (time.perf_counter() - began) / number * (len(waiting) - number)
-                told = ", ".join(f"{key} {done[case['name']].get(key)}" for key in part.told)
-                print(f"[{number}/{len(waiting)}] {part.name}: {case['name']}: {told} ({left:.0f} s left)", flush=True)
+                print(f"[{number}/{len(waiting)}] {part.name}: {name}: {told} ({left:.0f} s left)", flush=True)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
