@@ -34,6 +34,7 @@ _SOLVED, _INFEASIBLE, _NOT_FINITE = (
     STATUSES.index(status) for status in (Status.SOLVED, Status.INFEASIBLE, Status.NOT_FINITE)
 )
 _ACTIVE = 1e-4  # a clearance row nearer to its bound decides the plan [m]
+_LEFT = 1e-8  # a row of which less than this is left (squared) spoke of the held landing alone
 _MOVING = 1e-6
 
 
@@ -193,6 +194,8 @@ def _solved(
     start = rows.product(kept, axes)
     off = rows.product(matrix, start)
     free = matrix - rows.product(rows.product(matrix, axes.T), axes)
+    says = (free * free).sum(axis=1) > _LEFT * (matrix * matrix).sum(axis=1)
+    free = jnp.where(says[:, None], free, 0.0)
     u = start + interior_point(free, low - off, high - off, slack, iterations).u
     value = rows.product(matrix, u)
     beyond = jnp.where(used, jnp.maximum(jnp.maximum(low - value, value - high), 0.0), 0.0)

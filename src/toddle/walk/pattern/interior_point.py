@@ -135,10 +135,10 @@ def _iterate(problem: _Scaled, u: Float[Array, " unknowns"], sides: _Sides) -> t
     inverse = _inverse_root(problem.matrix, (force * by).sum(axis=0))
 
     def direction(product: Float[Array, "2 rows"]) -> tuple[Float[Array, " unknowns"], _Sides]:
-        known = (force * primal - product) * by
+        known = jnp.where(problem.present, (force * primal - product) * by, 0.0)
         du = -_times(inverse, _times(inverse.T, dual + _columns(problem, known)))
         along = _rows(problem, du)
-        df = jnp.where(problem.present, known + force * along * by, 0.0)
+        df = known + force * along * by
         dr = jnp.where(problem.present, slack * df - primal - along, 0.0)
         return du, _Sides(dr, df)
 
