@@ -73,6 +73,16 @@ def test_a_run_leaves_a_folder_with_all_of_it(folder: Path) -> None:
             assert (folder / name).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
 
 
+def test_the_documents_walker_has_a_body(walk: Run, tmp_path: Path) -> None:
+    words = ("heicub", "--weights", "document", "--for", 3, "--no-video", "--out", tmp_path / "run", "--json")
+    code, out, _ = walk(*words)
+    figures, config = json.loads(out), json.loads((tmp_path / "run" / "config.json").read_text())
+    assert (code, figures["fell"], figures["fallbacks"]) == (0, False, 0)
+    assert figures["zmp_error_mean_cm"] < 1
+    assert config["gait"]["step_time"] == 3.2
+    assert config["walker"]["feed_forward"]
+
+
 def test_its_figures_are_those_that_are_documented(folder: Path) -> None:
     figures = json.loads((folder / "figures.json").read_text())
     assert tuple(name for name in figures if name in DOCUMENTED) == DOCUMENTED
