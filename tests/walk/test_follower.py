@@ -16,7 +16,8 @@ from toddle.robots.gait import Gait
 from toddle.robots.humanoid import LEFT, RIGHT, Humanoid
 from toddle.robots.humanoids import load_humanoid
 from toddle.signals import Circle, Reference, Senses, Velocity
-from toddle.walk.follower import Follower, FollowerConfig, FollowerState, follower
+from toddle.walk.follower import Follower, follower
+from toddle.walk.follower_state import FollowerConfig, FollowerState
 from toddle.walk.loop import Moment, walk
 from toddle.walk.pattern.document import Document
 from toddle.walk.pattern.trajectory import walk_pattern

@@ -211,7 +211,8 @@ def _walks(asked: Walk, humanoid: Humanoid, document: Gait | None) -> Walker | F
         from toddle.walk.walker import walker
 
         return walker(humanoid, WalkConfig(deadline_ms=asked.deadline))
-    from toddle.walk.follower import FollowerConfig, follower
+    from toddle.walk.follower import follower
+    from toddle.walk.follower_state import FollowerConfig
 
     return follower(humanoid, document, FollowerConfig(deadline_ms=asked.deadline))
 

@@ -20,7 +20,8 @@ from toddle.outside.walk_record import Record, Recorder
 from toddle.robots.catalogue import HUMANOIDS
 from toddle.robots.humanoids import load_humanoid
 from toddle.signals import Velocity
-from toddle.walk.follower import Follower, FollowerConfig, follower
+from toddle.walk.follower import Follower, follower
+from toddle.walk.follower_state import FollowerConfig
 from toddle.walk.loop import walk
 from toddle.walk.scenarios import Leg
 
