@@ -35,6 +35,8 @@ class WalkConfig:
         latest: and at most so many nominal times.
         freeze: the landing is no longer moved so shortly before it [s].
         touchdown: share of the swing after which contact ends the step.
+        swing_speed: the landing is not moved farther than this takes the swing foot [m/s].
+        fall_speed: how fast a swing foot that is to land at once comes down [m/s].
         lowering: the swing foot is just over the floor so long before it is to land, and then lowered [s].
         late: a step waits so long for its touchdown [s].
         shift_time: of the weight shift before the first step [s].
@@ -50,17 +52,19 @@ class WalkConfig:
     follow_measured: bool = True
     plan_steps: bool = True
     step: StepWeights = field(default_factory=StepWeights)
-    zmp_gain: float = 1.5
+    zmp_gain: float = 2.0
     pressed: float = 1.0
     follow: float = 0.1
     offset_time: float = 1.0
     offset_most: float = 0.03
     velocity_gain: float = 0.3
     velocity_most: tuple[float, float] = (0.08, 0.2)
-    earliest: float = 0.25
+    earliest: float = 0.33
     latest: float = 1.15
     freeze: float = 0.06
     touchdown: float = 0.6
+    swing_speed: float = 1.0
+    fall_speed: float = 0.3
     lowering: float = 0.03
     late: float = 0.15
     shift_time: float = 0.3

@@ -9,6 +9,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+from jaxtyping import Float
+
 from toddle.robots.gait import Gait
 from toddle.robots.humanoid import LEFT, RIGHT
 from toddle.signals import Velocity
@@ -20,6 +23,7 @@ from toddle.walk.pattern.nmpc import apart
 from toddle.walk.state import Landing, Pose, Step
 
 STILL = Velocity(0.0, 0.0, 0.0)
+_TOUCH = 0.04  # between the decision to land at once and the touchdown [s]
 _CATCH_DS = 0.05  # double support of a step that catches a push while standing [s]
 _SAME_PLACE = 0.015  # feet that stand side by side to within this are left as they are [m]
 _SAME_YAW = 0.03  # [rad]
@@ -95,6 +99,35 @@ def bounds(step: Step, gait: Gait, config: WalkConfig) -> Bounds:
         (gait.foot_ahead - length, -width),
         (gait.foot_ahead + length, width),
     )
+
+
+def within_reach(step: Step, limits: Bounds, foot: Float[np.ndarray, "4"], config: WalkConfig) -> Bounds:
+    """The bounds, less what the swing foot can't do in the time left: come down, and go where it is to land.
+
+    Args:
+        step: under way.
+        limits: of the landing.
+        foot: where the swing foot is now, in the plan: x, y, z [m], yaw [rad].
+        config: the swing foot's speeds.
+    """
+    lifts = max(step.double_support - step.phase, 0.0)
+    least = max(float(foot[2]), 0.0) / config.fall_speed + _TOUCH
+    earliest = max(limits.earliest, step.phase + lifts + least)
+    reach = config.swing_speed * max(max(step.end, earliest) - step.phase - lifts, 0.0)
+    x, y = rotate(-step.foot[2], (float(foot[0]) - step.foot[0], float(foot[1]) - step.foot[1]))
+    (x0, x1), (y0, y1) = (
+        _overlap(low, high, at - reach, at + reach)
+        for low, high, at in zip(limits.least, limits.most, (x, y), strict=True)
+    )
+    return limits._replace(least=(x0, y0), most=(x1, y1), earliest=earliest, latest=max(limits.latest, earliest))
+
+
+def _overlap(low: float, high: float, least: float, most: float) -> Pair:
+    """What two intervals have in common; where that is nothing, the end of the first that is nearest to the second."""
+    start, end = max(low, least), min(high, most)
+    if start <= end:
+        return start, end
+    return (low, low) if most < low else (high, high)
 
 
 def landing_box(gait: Gait) -> tuple[float, float, float]:

@@ -47,6 +47,7 @@ from toddle.walk.stepping import (
     moving,
     shift_zmp,
     side_by_side,
+    within_reach,
 )
 
 _PERSISTS = 5  # so many unusable plans, one after another, end the walk
@@ -270,7 +271,7 @@ class Walker:
         came = (foot[0] - step.origin[0], foot[1] - step.origin[1])
         short = pendulum.ramp(omega, came, step.double_support - step.phase, step.double_support)
         x0 = rotate(-yaw, (xi[0] - foot[0] - short[0], xi[1] - foot[1] - short[1]))
-        step = self._choose(step, x0, ahead)
+        step = self._choose(state, x0, ahead)
         state = state._replace(step=step)
         share = min(step.phase / step.double_support, 1.0) if step.double_support > 0 else 1.0
         zmp = (step.origin[0] + share * came[0], step.origin[1] + share * came[1])
@@ -287,11 +288,13 @@ class Walker:
         beyond = rotate(yaw, (at_end[0], at_end[1]))
         return foot[0] + short[0] + beyond[0], foot[1] + short[1] + beyond[1]
 
-    def _choose(self, step: Step, x0: Pair, ahead: Chain) -> Step:
+    def _choose(self, state: WalkerState, x0: Pair, ahead: Chain) -> Step:
         """The step with its landing adjusted."""
+        step = state.step
         if step.end - step.phase < self.config.freeze:
             return step
         goal, limits = aim(step, ahead, self.gait), bounds(step, self.gait, self.config)
+        limits = within_reach(step, limits, state.feet[1 - step.stance], self.config)
         if not self.config.adapt_time:
             limits = limits._replace(earliest=goal.end, latest=goal.end)
         if not self.config.adapt_steps:

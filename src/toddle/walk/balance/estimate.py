@@ -25,7 +25,7 @@ from toddle.signals import Senses
 from toddle.walk.balance.alignment import align
 from toddle.walk.balance.zmp import zmp
 from toddle.walk.posture.model import PostureModel
-from toddle.walk.posture.survey import survey
+from toddle.walk.posture.survey import jacobians, survey
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,8 @@ class Observer:
         weight: of the robot [N].
         position_gain: share of the difference between measured and predicted place that corrects the place, each tick.
         velocity_gain: the same difference a tick, and its share that corrects the velocity.
+        turning: from the gyroscope's axes to those of body 0; None: it sits elsewhere, and speeds aren't used.
+        rates_gain: share of the difference to the velocity by joints' speeds and gyroscope that corrects it, each tick.
         lands: a sole carries once it feels this share of the weight ...
         lifts: ... and until it feels less than this.
     """
@@ -45,15 +47,18 @@ class Observer:
     model: PostureModel
     omega: float
     weight: float
+    turning: Float[np.ndarray, "3 3"] | None
     position_gain: float = 0.3
     velocity_gain: float = 0.05
+    rates_gain: float = 0.15
     lands: float = 0.08
     lifts: float = 0.04
 
 
 def observer(humanoid: Humanoid, model: PostureModel) -> Observer:
     """The observer of a humanoid, with the gains that the defaults are."""
-    return Observer(model, humanoid.gait.omega, humanoid.mass * GRAVITY)
+    turning = humanoid.imu.rotation if humanoid.imu.body == 0 else None
+    return Observer(model, humanoid.gait.omega, humanoid.mass * GRAVITY, turning)
 
 
 class Estimate(NamedTuple):
@@ -133,6 +138,9 @@ def estimate(
         surprise = body.com - expected
         com = expected + observer.position_gain * surprise
         velocity += observer.velocity_gain / dt * surprise
+        if observer.turning is not None:
+            felt = _felt_velocity(observer.model, observer.turning, senses, body, pressed, load)
+            velocity += observer.rates_gain * (felt - velocity)
     dcm = com[:2] + velocity[:2] / observer.omega
     return Estimate(
         senses.t, body.q, com, velocity, dcm, pressed, body.soles, body.sole_tilt, force, contact, body.yaw, body.tilt
@@ -182,6 +190,31 @@ def _acceleration(observer: Observer, senses: Senses, body: Body) -> Float[np.nd
     force *= GRAVITY / max(float(force[2]), 0.5 * observer.weight)
     force[2] = 0.0
     return force
+
+
+def _felt_velocity(
+    model: PostureModel,
+    turning: Float[np.ndarray, "3 3"],
+    senses: Senses,
+    body: Body,
+    pressed: Float[np.ndarray, "2"],
+    load: Float[np.ndarray, "2"],
+) -> Float[np.ndarray, "3"]:
+    """Velocity of the centre of mass by the joints' speeds and the gyroscope.
+
+    The point of each carrying sole that the zero moment point presses on is taken to rest, so that a sole may rock.
+    """
+    moving = jacobians(model, body.q)
+    speeds = np.concatenate([np.zeros(3), turning @ senses.gyro, senses.rates])
+    velocity = moving.com @ speeds
+    for sole, share, place in zip(moving.soles, _shares(load), body.soles, strict=True):
+        linear, angular = sole[:3] @ speeds, sole[3:] @ speeds
+        x, y, z = pressed[0] - place[0], pressed[1] - place[1], -place[2]
+        at_point = np.array(
+            [angular[1] * z - angular[2] * y, angular[2] * x - angular[0] * z, angular[0] * y - angular[1] * x]
+        )
+        velocity -= share * (linear + at_point)
+    return velocity
 
 
 def _shares(load: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
