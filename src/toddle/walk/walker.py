@@ -52,6 +52,7 @@ from toddle.walk.stepping import (
 
 _PERSISTS = 5  # so many unusable plans, one after another, end the walk
 _CALM = 0.02  # a DCM this near to where it should be lets the robot stand after one more step [m]
+_SETTLING = 0.5  # no step catches a robot that has just been put down [s]
 _SHRUNK = 0.8  # of the soles: a DCM outside of this, while standing, calls for a step
 
 
@@ -111,6 +112,8 @@ class Walker:
         if state.fallbacks >= _PERSISTS:
             velocity = STILL
         sensed = estimate(self.observer, senses, state.anchors, np.array(state.load), state.estimate, TICK)
+        if state.estimate is None:
+            state = self._settled_on(state, sensed)
         state = state._replace(t=state.t + TICK, estimate=sensed)
         state = self._change_mode(state, sensed, velocity)
         wanted = _sum(velocity, state.correction) if moving(velocity) else STILL
@@ -122,6 +125,13 @@ class Walker:
         state = state._replace(feet=feet.pose, feet_velocity=feet.velocity, feet_acceleration=feet.acceleration)
         reference = self._reference(state)
         return self._act(state, reference, sensed, wanted)
+
+    def _settled_on(self, state: WalkerState, sensed: Estimate) -> WalkerState:
+        """The state at the first tick: where the floor leans, the joints lean against it from the start."""
+        roll, pitch = sensed.sole_tilt.mean(axis=0).tolist()
+        height, most = float(sensed.com[2]), self.config.offset_most
+        x, y = (min(max(lean, -most), most) for lean in (-pitch * height, roll * height))
+        return state._replace(offset=(x, y), com=(float(sensed.com[0]), float(sensed.com[1]), 0.0, 0.0))
 
     def _change_mode(self, state: WalkerState, sensed: Estimate, velocity: Velocity) -> WalkerState:
         if state.mode == Mode.STAND:
@@ -143,7 +153,7 @@ class Walker:
     def _leave_standing(self, state: WalkerState, sensed: Estimate, velocity: Velocity) -> WalkerState:
         xi = (float(sensed.dcm[0]), float(sensed.dcm[1]))
         area = self.area(state, _SHRUNK)
-        if self.config.adapt_steps and support.margin(area, xi) < 0:
+        if self.config.adapt_steps and state.t > _SETTLING and support.margin(area, xi) < 0:
             middle = state.anchors[:, :2].mean(axis=0)
             yaw = float(state.anchors[:, 3].mean())
             aside = rotate(-yaw, (xi[0] - middle[0], xi[1] - middle[1]))[1]
