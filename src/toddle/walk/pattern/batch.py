@@ -11,7 +11,7 @@ the leading axis.
 from __future__ import annotations
 
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -22,7 +22,7 @@ from toddle.robots.gait import Gait
 from toddle.robots.humanoid import LEFT
 from toddle.walk.pattern import batch_rows as rows
 from toddle.walk.pattern.batch_command import cap, drawn_to, nominal, rounding, shifted, sign_of, turned
-from toddle.walk.pattern.batch_state import STATUSES, BatchPlan, BatchState, Numbers, stacked
+from toddle.walk.pattern.batch_state import STATUSES, BatchPlan, BatchState, stacked
 from toddle.walk.pattern.interior_point import ITERATIONS, interior_point
 from toddle.walk.pattern.nmpc_problem import NEVER, Nmpc
 from toddle.walk.pattern.obstacles import MOST
@@ -41,8 +41,8 @@ _MOVING = 1e-6
 def plan_batch(
     problem: Nmpc,
     states: BatchState,
-    velocities: Float[Numbers, "walkers 3"],
-    circles: Float[Numbers, "walkers circles 3"] | None = None,
+    velocities: Float[Any, "walkers 3"],
+    circles: Float[Any, "walkers circles 3"] | None = None,
     last: BatchPlan | None = None,
     iterations: int = ITERATIONS,
 ) -> BatchPlan:
@@ -251,7 +251,7 @@ class BatchWalk(NamedTuple):
 
     at: BatchState
     plan: BatchPlan
-    shift: Float[Array, "*walkers"]
+    shift: Float[Any, "*walkers"]
 
 
 def start_batch(problem: Nmpc, walkers: int, dtype: type[np.floating] = np.float32) -> BatchWalk:
@@ -265,8 +265,8 @@ def start_batch(problem: Nmpc, walkers: int, dtype: type[np.floating] = np.float
 def step_batch(
     problem: Nmpc,
     walk: BatchWalk,
-    velocities: Float[Numbers, "walkers 3"],
-    circles: Float[Numbers, "walkers circles 3"] | None = None,
+    velocities: Float[Any, "walkers 3"],
+    circles: Float[Any, "walkers circles 3"] | None = None,
     iterations: int = ITERATIONS,
 ) -> BatchWalk:
     """One iteration of each; it lasts a sample, or what is left of the step. Commands are capped to what fits.

@@ -7,12 +7,13 @@ its directions from the rows (`held`).
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
+from toddle.walk.pattern.interior_point import inverse_of_root
 from toddle.walk.pattern.nmpc_kernels import (
     BODY_ROWS,
     FOOT_PATH,
@@ -100,7 +101,7 @@ class Factor(NamedTuple):
     base: Float[Array, "samples steps"]
 
 
-def product(a: Float[Array, "..."], b: Float[Array, "..."]) -> Float[Array, "..."]:
+def product(a: Float[Any, "..."], b: Float[Any, "..."]) -> Float[Array, "..."]:
     """In full precision, which not every accelerator takes by itself."""
     return jnp.matmul(a, b, precision=jax.lax.Precision.HIGHEST)
 
@@ -136,7 +137,7 @@ def factor(tables: Tables, numbers: Numbers, walker: Walker) -> Factor:
     difference = jnp.eye(feet, dtype=shares.dtype) - jnp.eye(feet, k=-1, dtype=shares.dtype)
     h = numbers.beta * product(carried.T, carried) - product(lower, lower.T)
     h = h + product(difference.T, weight[:, None] * difference) + numbers.last * jnp.eye(feet, dtype=shares.dtype)
-    inverse = inverse_root(h)
+    inverse = inverse_of_root(h)
     drift = product(tables.zmp_state, walker.com.T) - shares[:, :1] * walker.origin[None]
     by_speed = numbers.alpha * (product(tables.velocity_state, walker.com.T) - _target(numbers, walker, count))
     upper = product(tables.w_velocity.T, by_speed) + numbers.beta * product(tables.w_zmp.T, drift)
@@ -145,24 +146,6 @@ def factor(tables: Tables, numbers: Numbers, walker: Walker) -> Factor:
     y = jnp.concatenate([upper, product(inverse, rest)]).T
     base = product(-carried - product(tables.w_zmp, lower.T), inverse.T)
     return Factor(shares, lower, inverse, y, drift, base)
-
-
-def inverse_root(h: Float[Array, "n n"]) -> Float[Array, "n n"]:
-    """The inverse of the lower Cholesky factor of a small matrix, written out."""
-    n = h.shape[0]
-    c: list[list[Array]] = [[h[0, 0]] * n for _ in range(n)]
-    inverse: list[list[Array]] = [[jnp.zeros_like(h[0, 0])] * n for _ in range(n)]
-    for j in range(n):
-        for i in range(j, n):
-            total = h[i, j] - sum((c[i][k] * c[j][k] for k in range(j)), start=jnp.zeros_like(h[0, 0]))
-            c[i][j] = jnp.sqrt(jnp.maximum(total, jnp.finfo(h.dtype).tiny)) if i == j else total / c[j][j]
-    for j in range(n):
-        for i in range(j, n):
-            total = jnp.full_like(h[0, 0], 1.0 if i == j else 0.0)
-            for k in range(j, i):
-                total = total - c[i][k] * inverse[k][j]
-            inverse[i][j] = total / c[i][i]
-    return jnp.stack([jnp.stack(row) for row in inverse])
 
 
 def _times(count: int, sample: float, walker: Walker) -> Float[Array, " samples"]:
@@ -178,7 +161,7 @@ def _target(numbers: Numbers, walker: Walker, count: int) -> Float[Array, "sampl
 
 
 def _rows(
-    jerks: Float[Array, "rows samples"],
+    jerks: Float[Any, "rows samples"],
     feet: Float[Array, "rows steps"],
     x: Float[Array, " rows"],
     y: Float[Array, " rows"],
@@ -224,8 +207,7 @@ def foot_rows(tables: Tables, numbers: Numbers, walker: Walker, found: Factor) -
 
 def zmp_rows(tables: Tables, numbers: Numbers, walker: Walker, found: Factor) -> Rows:
     """The zero moment point stays in the shrunk sole around its reference."""
-    count, feet = found.base.shape
-    shares = found.shares[:, 2:]
+    count, shares = len(found.base), found.shares[:, 2:]
     error = found.drift - product(shares, walker.last[:, :2]) + product(tables.zmp_jerk, walker.jerks.T)
     yaw = (found.shares[:, 0] + found.shares[:, 1]) * walker.yaws[0] + product(shares, walker.yaws[1:])
     cos, sin = jnp.cos(yaw), jnp.sin(yaw)

@@ -1,15 +1,15 @@
 """Thousands of walkers side by side: their states, plans and commands as arrays with a leading axis.
 
-The same records as in `nmpc_problem`, as pytrees. Nothing here knows how a plan is made (`batch`).
+The same records as in `nmpc_problem`, as pytrees of arrays of JAX or NumPy. Nothing here knows how a plan is made (`batch`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Bool, Float, Int
 
 from toddle.robots.humanoid import LEFT, RIGHT
 from toddle.signals import Footstep
@@ -21,8 +21,6 @@ STATUSES = tuple(Status)
 
 PADDING = -1.0
 """A circle with a negative radius is none: walkers may have different numbers of obstacles."""
-
-Numbers = Array | np.ndarray
 
 
 class BatchState(NamedTuple):
@@ -40,15 +38,15 @@ class BatchState(NamedTuple):
         halt: the walker stands after so many landings; 0: it stands; -1: it walks on.
     """
 
-    com: Float[Numbers, "*walkers 2 3"]
-    side: Int[Numbers, "*walkers"]
-    support: Float[Numbers, "*walkers 3"]
-    lifted: Float[Numbers, "*walkers 3"]
-    origin: Float[Numbers, "*walkers 2"]
-    phase: Float[Numbers, "*walkers"]
-    remaining: Float[Numbers, "*walkers"]
-    double_support: Float[Numbers, "*walkers"]
-    halt: Int[Numbers, "*walkers"]
+    com: Float[Any, "*walkers 2 3"]
+    side: Int[Any, "*walkers"]
+    support: Float[Any, "*walkers 3"]
+    lifted: Float[Any, "*walkers 3"]
+    origin: Float[Any, "*walkers 2"]
+    phase: Float[Any, "*walkers"]
+    remaining: Float[Any, "*walkers"]
+    double_support: Float[Any, "*walkers"]
+    halt: Int[Any, "*walkers"]
 
 
 class BatchPlan(NamedTuple):
@@ -67,15 +65,15 @@ class BatchPlan(NamedTuple):
         state: it was made at.
     """
 
-    feet: Float[Numbers, "*walkers steps 3"]
-    displacement: Float[Numbers, "*walkers steps 2"]
-    jerks: Float[Numbers, "*walkers 2 samples"]
-    zmp: Float[Numbers, "*walkers samples 2"]
-    status: Int[Numbers, "*walkers"]
-    obstacle: Bool[Numbers, "*walkers"]
-    violation: Float[Numbers, "*walkers"]
-    overlap: Float[Numbers, "*walkers"]
-    known: Bool[Numbers, "*walkers"]
+    feet: Float[Any, "*walkers steps 3"]
+    displacement: Float[Any, "*walkers steps 2"]
+    jerks: Float[Any, "*walkers 2 samples"]
+    zmp: Float[Any, "*walkers samples 2"]
+    status: Int[Any, "*walkers"]
+    obstacle: Bool[Any, "*walkers"]
+    violation: Float[Any, "*walkers"]
+    overlap: Float[Any, "*walkers"]
+    known: Bool[Any, "*walkers"]
     state: BatchState
 
 
