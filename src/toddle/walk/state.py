@@ -44,6 +44,7 @@ class Step(NamedTuple):
         turn: yaw of the landing over the stance foot's [rad].
         nominal: the displacement that the command asked for when the step began.
         planned: the displacement as planned last.
+        asked: the velocity that was commanded when the step began.
         final: the robot will stand afterwards.
         moved: the landing was moved far from the plan by a push.
     """
@@ -58,12 +59,13 @@ class Step(NamedTuple):
     turn: float
     nominal: Pair
     planned: Pair
+    asked: Velocity
     final: bool
     moved: bool = False
 
 
 class Landing(NamedTuple):
-    """A touchdown: when [s], which side, where, and the velocity that was asked for in the step that it ends."""
+    """A touchdown: when [s], which side, where, and the velocity that the step was asked for."""
 
     t: float
     side: int

@@ -139,7 +139,9 @@ def landing_box(gait: Gait) -> tuple[float, float, float]:
 def begin(gait: Gait, stance: int, foot: Pose, origin: Pair, ahead: Chain, turn: float, final: bool) -> Step:
     """A step that starts now."""
     nominal = rotate(-foot[2], ahead.displacements[0])
-    return Step(stance, foot, origin, gait.double_support, 0.0, gait.step_time, nominal, turn, nominal, nominal, final)
+    return Step(
+        stance, foot, origin, gait.double_support, 0.0, gait.step_time, nominal, turn, nominal, nominal, STILL, final
+    )
 
 
 def catching(gait: Gait, stance: int, foot: Pose, origin: Pair) -> tuple[Step, tuple[Pair, ...]]:

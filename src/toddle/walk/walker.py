@@ -25,6 +25,7 @@ from toddle.walk.balance.pendulum import Pair
 from toddle.walk.balance.step_adjustment import adjust
 from toddle.walk.config import TICK, WalkConfig
 from toddle.walk.pattern.displacement import rotate
+from toddle.walk.pattern.feasible import cap
 from toddle.walk.pattern.nmpc import NEVER, Nmpc, PlanState, nmpc
 from toddle.walk.pattern.nmpc import plan as next_plan
 from toddle.walk.pattern.obstacles import NONE
@@ -109,8 +110,7 @@ class Walker:
         Returns:
             The next state, and what to do.
         """
-        if state.fallbacks >= _PERSISTS:
-            velocity = STILL
+        velocity = STILL if state.fallbacks >= _PERSISTS else cap(velocity, self.gait)
         sensed = estimate(self.observer, senses, state.anchors, np.array(state.load), state.estimate, TICK)
         if state.estimate is None:
             state = self._settled_on(state, sensed)
@@ -180,6 +180,7 @@ class Walker:
         final = not walks and self._calm(state, foot, stance, origin)
         ahead = chain(self.gait, by_command(self.gait, wanted, stance, foot[2]), final)
         step = begin(self.gait, stance, foot, origin, ahead, wanted.omega * self.gait.step_time, final)
+        step = step._replace(asked=velocity)
         return state._replace(mode=Mode.STEP, step=step, later=ahead.displacements[1:], plan_age=math.inf)
 
     def _calm(self, state: WalkerState, foot: Pose, stance: int, origin: Pair) -> bool:
@@ -198,7 +199,7 @@ class Walker:
         carried = state.step.foot[2]
         anchors[landed, 3] = carried + math.remainder(anchors[landed, 3] - carried, 2 * math.pi)
         pose = _pose(anchors, landed)
-        landings = (*state.landings[-2:], Landing(state.t, landed, pose, velocity))
+        landings = (*state.landings[-2:], Landing(state.t, landed, pose, state.step.asked))
         correction = state.correction
         if moving(velocity) and not state.step.moved and not (state.plan and state.plan.obstacle):
             correction = corrected(correction, landings, self.config)

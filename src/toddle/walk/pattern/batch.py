@@ -62,39 +62,35 @@ def plan_batch(
     around = jnp.zeros((len(velocities), 0, 3), dtype) if circles is None else jnp.asarray(circles, dtype)
     if last is None:
         last = jax.vmap(partial(nominal, problem.gait))(states, velocities)
-    return _plan(problem.gait, iterations, _constants(problem, dtype), states, velocities, around, last)
+    fixed = _Fixed(problem.gait, rows.Numbers(*map(float, problem.numbers)), problem.freeze, iterations)
+    tables = jax.tree.map(lambda part: jnp.asarray(part, dtype), problem.tables)
+    return _plan(fixed, tables, states, velocities, around, last)
 
 
-class _Constants(NamedTuple):
-    tables: rows.Tables
+class _Fixed(NamedTuple):
+    """What all walkers have in common; hashable, so that it is compiled in."""
+
+    gait: Gait
     numbers: rows.Numbers
-    freeze: Array
+    freeze: float
+    iterations: int
 
 
-def _constants(problem: Nmpc, dtype: jnp.dtype) -> _Constants:
-    tables, numbers, freeze = jax.tree.map(
-        lambda part: jnp.asarray(np.asarray(part), dtype), (problem.tables, problem.numbers, problem.freeze)
-    )
-    return _Constants(tables, numbers, freeze)
-
-
-@partial(jax.jit, static_argnums=(0, 1))
+@partial(jax.jit, static_argnums=0)
 def _plan(
-    gait: Gait,
-    iterations: int,
-    constants: _Constants,
+    fixed: _Fixed,
+    tables: rows.Tables,
     states: BatchState,
     velocities: Float[Array, "walkers 3"],
     circles: Float[Array, "walkers circles 3"],
     last: BatchPlan,
 ) -> BatchPlan:
-    return jax.vmap(partial(_one, gait, iterations, constants))(states, velocities, circles, last)
+    return jax.vmap(partial(_one, fixed, tables))(states, velocities, circles, last)
 
 
 def _one(
-    gait: Gait,
-    iterations: int,
-    constants: _Constants,
+    fixed: _Fixed,
+    tables: rows.Tables,
     state: BatchState,
     velocity: Float[Array, "3"],
     circles: Float[Array, "circles 3"],
@@ -106,9 +102,9 @@ def _one(
     finite = _finite(state, velocity) & jnp.isfinite(jnp.where(there[:, None], circles, 0.0)).all()
     state = jax.tree.map(lambda part: jnp.where(jnp.isfinite(part), part, 0), state)
     velocity = jnp.where(jnp.isfinite(velocity).all(), velocity, 0.0)
-    guess = _either(last.known, shifted(gait, last, state, velocity), nominal(gait, state, velocity))
-    walker = _walker(gait, constants, state, velocity, circles, there & finite, guess, last.known)
-    found = _solved(gait, iterations, constants, state, walker, guess)
+    guess = _either(last.known, shifted(fixed.gait, last, state, velocity), nominal(fixed.gait, state, velocity))
+    walker = _walker(fixed, state, velocity, circles, there & finite, guess, last.known)
+    found = _solved(fixed, tables, state, walker, guess)
     found = found._replace(status=jnp.where(finite, found.status, _NOT_FINITE))
     return _either(found.status == _SOLVED, found, guess._replace(status=found.status))._replace(
         known=jnp.ones_like(last.known), state=state
@@ -116,8 +112,7 @@ def _one(
 
 
 def _walker(
-    gait: Gait,
-    constants: _Constants,
+    fixed: _Fixed,
     state: BatchState,
     velocity: Float[Array, "3"],
     circles: Float[Array, "circles 3"],
@@ -126,14 +121,14 @@ def _walker(
     known: Bool[Array, ""],
 ) -> rows.Walker:
     """What the programme is made of, relative to the foot that stands."""
+    gait, numbers = fixed.gait, fixed.numbers
     dtype, place = state.com.dtype, state.support[:2]
     sign, zero = sign_of(state.side, dtype), jnp.zeros((1,), dtype)
     yaws, drawn = turned(gait, state.support[2], velocity), drawn_to(gait, sign, state.support[2], velocity)
-    pinned = known & (state.remaining > 0) & (state.remaining <= constants.freeze) & (state.halt != 0)
+    pinned = known & (state.remaining > 0) & (state.remaining <= fixed.freeze) & (state.halt != 0)
     landing = guess.feet[0, 2]
     yaws = jnp.where(pinned, jnp.concatenate([yaws[:1], turned(gait, landing, velocity)[:-1]]), yaws)
     following = jnp.concatenate([drawn[:1], drawn_to(gait, -sign, landing, velocity)[:-1]])
-    numbers = constants.numbers
     seen, around = _near(circles, there, place, gait.steps * numbers.reach + numbers.body + 0.5)
     return rows.Walker(
         com=state.com - jnp.stack([place, jnp.zeros_like(place), jnp.zeros_like(place)], axis=1),
@@ -157,7 +152,7 @@ def _walker(
 
 
 def _near(
-    circles: Float[Array, "circles 3"], there: Bool[Array, " circles"], place: Float[Array, "2"], reach: Array
+    circles: Float[Array, "circles 3"], there: Bool[Array, " circles"], place: Float[Array, "2"], reach: float
 ) -> tuple[Float[Array, "some 3"], Bool[Array, " some"]]:
     """The nearest `MOST` circles relative to a place, and which of them are within reach."""
     moved = jnp.where(there[:, None], circles, 0.0) - jnp.concatenate([place, jnp.zeros_like(place[:1])])[None]
@@ -169,15 +164,14 @@ def _near(
 
 
 def _solved(
-    gait: Gait,
-    iterations: int,
-    constants: _Constants,
+    fixed: _Fixed,
+    tables: rows.Tables,
     state: BatchState,
     walker: rows.Walker,
     guess: BatchPlan,
 ) -> BatchPlan:
     """The programme's answer; the status says whether it may be used."""
-    tables, numbers, _ = constants
+    numbers = fixed.numbers
     found = rows.factor(tables, numbers, walker)
     hard = rows.foot_rows(tables, numbers, walker, found)
     balance = [part(tables, numbers, walker, found) for part in (rows.zmp_rows, rows.capture_rows)]
@@ -196,13 +190,15 @@ def _solved(
     free = matrix - rows.product(rows.product(matrix, axes.T), axes)
     says = (free * free).sum(axis=1) > _LEFT * (matrix * matrix).sum(axis=1)
     free = jnp.where(says[:, None], free, 0.0)
-    u = start + interior_point(free, low - off, high - off, slack, iterations).u
+    u = start + interior_point(free, low - off, high - off, slack, fixed.iterations).u
     value = rows.product(matrix, u)
     beyond = jnp.where(used, jnp.maximum(jnp.maximum(low - value, value - high), 0.0), 0.0)
     first, second = len(hard.low), len(hard.low) + sum(len(part.low) for part in balance)
     jerks, feet, moved, zmp = _unfolded(tables, numbers, walker, found, u - y)
     place = state.support[:2]
-    feet = jnp.concatenate([feet + place[None], (walker.yaws[1:] + _turns(numbers, gait.steps, u))[:, None]], axis=1)
+    feet = jnp.concatenate(
+        [feet + place[None], (walker.yaws[1:] + _turns(numbers, fixed.gait.steps, u))[:, None]], axis=1
+    )
     broken = beyond[:first].max()
     finite = jnp.isfinite(jerks).all() & jnp.isfinite(feet).all()
     status = jnp.where(finite, jnp.where(broken <= _BROKEN, _SOLVED, _INFEASIBLE), _NOT_FINITE)

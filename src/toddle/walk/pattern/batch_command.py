@@ -5,6 +5,8 @@ Each function bears the name of the one that does the same for a single walker.
 
 from __future__ import annotations
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
@@ -99,10 +101,10 @@ def cap(gait: Gait, velocity: Float[Array, "3"]) -> Float[Array, "3"]:
     def fits(share: Float[Array, ""]) -> Bool[Array, ""]:
         return widening(gait, share * velocity)[1]
 
-    def halve(_: int, share: Float[Array, ""]) -> Float[Array, ""]:
+    def halve(_: Any, share: Float[Array, ""]) -> Float[Array, ""]:
         return jnp.where(fits(share), share, share / 2)
 
-    def narrow(_: int, between: tuple[Array, Array]) -> tuple[Array, Array]:
+    def narrow(_: Any, between: tuple[Array, Array]) -> tuple[Array, Array]:
         inside, outside = between
         middle = (inside + outside) / 2
         good = fits(middle)

@@ -1,6 +1,6 @@
 """Thousands of walkers side by side: their states, plans and commands as arrays with a leading axis.
 
-The same records as in `nmpc_problem`, as pytrees of arrays of JAX or NumPy. Nothing here knows how a plan is made (`batch`).
+The records of `nmpc_problem` as pytrees of arrays, JAX's or NumPy's. How a plan is made stands in `batch`.
 """
 
 from __future__ import annotations

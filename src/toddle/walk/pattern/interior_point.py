@@ -28,7 +28,7 @@ UNBOUNDED = 1e29
 
 _SMALL = 4  # a matrix no larger is factored element by element
 _SHORT = 1e-12  # a row shorter than this says nothing
-_HARD = 1e-10  # slack of a hard row, scaled: a multiplier stays finite where hard rows contradict each other
+_HARD = {jnp.dtype("float32"): 1e-10, jnp.dtype("float64"): 1e-12}  # slack of a hard row, scaled: two may conflict
 _FORCE = 1e5  # of every row at the start, scaled: conflicting rows end with such multipliers, and it is easily lowered
 _CORRECTORS, _FURTHER, _OFF = 2, 0.3, 10.0  # Gondzio's (1996): try a longer step, mend products so far off the centre
 _NEAR = 0.995  # share of the way to the boundary that a step takes
@@ -104,7 +104,7 @@ def _scaled(
     present = jnp.stack([says & (low > -UNBOUNDED), says & (high < UNBOUNDED)])
     bound = jnp.where(present, jnp.stack([-low * by, high * by]), 1.0)
     unit = jnp.maximum(-bound.min(), 1e-3)
-    soft = jnp.maximum(slack * by * by, _HARD)
+    soft = jnp.maximum(slack * by * by, _HARD[matrix.dtype])
     return _Scaled(matrix * by[:, None], bound / unit, present, soft, unit)
 
 
