@@ -96,6 +96,7 @@ class WalkerState(NamedTuple):
         plan: the last plan, and how old it is [s].
         plan_age: see plan.
         later: displacements of the footsteps after the landing under way, in the plan's frame [m].
+        circles: obstacles near the robot, in the plan's frame: centre and radius [m].
         fallbacks: plans that could not be used, one after another.
     """
 
@@ -118,6 +119,7 @@ class WalkerState(NamedTuple):
     plan: Plan | None
     plan_age: float
     later: tuple[Pair, ...]
+    circles: Float[np.ndarray, "circles 3"]
     fallbacks: int
 
 

@@ -19,10 +19,11 @@ from toddle.walk.balance.pendulum import Pair, Timing, offset, timing
 from toddle.walk.balance.step_adjustment import Aim, Bounds
 from toddle.walk.config import WalkConfig
 from toddle.walk.pattern.displacement import displacements, rotate
-from toddle.walk.pattern.nmpc import apart
+from toddle.walk.pattern.nmpc_problem import GAP, apart
 from toddle.walk.state import Landing, Pose, Step
 
 STILL = Velocity(0.0, 0.0, 0.0)
+_NEAR = 0.6  # obstacles farther than this from a landing don't matter to it [m]
 _TOUCH = 0.04  # between the decision to land at once and the touchdown [s]
 _CATCH_DS = 0.05  # double support of a step that catches a push while standing [s]
 _SAME_PLACE = 0.015  # feet that stand side by side to within this are left as they are [m]
@@ -120,6 +121,27 @@ def within_reach(step: Step, limits: Bounds, foot: Float[np.ndarray, "4"], confi
         for low, high, at in zip(limits.least, limits.most, (x, y), strict=True)
     )
     return limits._replace(least=(x0, y0), most=(x1, y1), earliest=earliest, latest=max(limits.latest, earliest))
+
+
+def clear_of(gait: Gait, step: Step, circles: Float[np.ndarray, "circles 3"]) -> Float[np.ndarray, "rows 3"]:
+    """Rows n . D >= least that keep the landing sole off the obstacles within reach; n in the stance foot's frame.
+
+    The sole is a box, the obstacle seen from where the landing is planned: linearised there.
+    """
+    rows = []
+    yaw = step.foot[2] + step.turn
+    ahead = rotate(yaw, (gait.foot_ahead, 0.0))
+    planned = rotate(step.foot[2], step.planned)
+    for x, y, radius in circles.tolist():
+        from_x, from_y = step.foot[0] + ahead[0] - x, step.foot[1] + ahead[1] - y
+        away = math.hypot(from_x + planned[0], from_y + planned[1])
+        if not 0 < away < radius + _NEAR:
+            continue
+        nx, ny = (from_x + planned[0]) / away, (from_y + planned[1]) / away
+        along, aside = rotate(-yaw, (nx, ny))
+        half = abs(along) * gait.foot_length / 2 + abs(aside) * gait.foot_width / 2
+        rows.append((*rotate(-step.foot[2], (nx, ny)), radius + GAP + half - nx * from_x - ny * from_y))
+    return np.array(rows).reshape(-1, 3)
 
 
 def _overlap(low: float, high: float, least: float, most: float) -> Pair:

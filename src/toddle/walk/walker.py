@@ -23,6 +23,7 @@ from toddle.walk.balance.estimate import Estimate, Observer, estimate, observer
 from toddle.walk.balance.feet import Feet, rest, swing
 from toddle.walk.balance.pendulum import Pair
 from toddle.walk.balance.step_adjustment import adjust
+from toddle.walk.clearance import held_back
 from toddle.walk.config import TICK, WalkConfig
 from toddle.walk.pattern.displacement import rotate
 from toddle.walk.pattern.feasible import cap
@@ -43,6 +44,7 @@ from toddle.walk.stepping import (
     by_command,
     catching,
     chain,
+    clear_of,
     corrected,
     first_stance,
     moving,
@@ -52,6 +54,7 @@ from toddle.walk.stepping import (
 )
 
 _PERSISTS = 5  # so many unusable plans, one after another, end the walk
+_CROSSED = 0.01  # a plan that breaks its own rows by more is no plan [m]
 _CALM = 0.02  # a DCM this near to where it should be lets the robot stand after one more step [m]
 _SETTLING = 0.5  # no step catches a robot that has just been put down [s]
 _SHRUNK = 0.8  # of the soles: a DCM outside of this, while standing, calls for a step
@@ -93,7 +96,7 @@ class Walker:
         step = begin(self.gait, RIGHT, foot, (0.0, 0.0), ahead, 0.0, True)
         return WalkerState(
             0.0, Mode.STAND, step, 0.0, feet.copy(), feet, still, still, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0),
-            (0.5, 0.5), self.humanoid.home, STILL, (), None, None, math.inf, (), 0,
+            (0.5, 0.5), self.humanoid.home, STILL, (), None, None, math.inf, (), NONE, 0,
         )  # fmt: skip
 
     def step(
@@ -114,10 +117,13 @@ class Walker:
         sensed = estimate(self.observer, senses, state.anchors, np.array(state.load), state.estimate, TICK)
         if state.estimate is None:
             state = self._settled_on(state, sensed)
-        state = state._replace(t=state.t + TICK, estimate=sensed)
+        state = state._replace(t=state.t + TICK, estimate=sensed, circles=self._placed(sensed, senses, circles))
+        if len(state.circles):
+            x, y = state.anchors[:, :2].mean(axis=0).tolist()
+            velocity = cap(held_back(velocity, state.circles, (x, y, sensed.yaw), self.gait), self.gait)
         state = self._change_mode(state, sensed, velocity)
         wanted = _sum(velocity, state.correction) if moving(velocity) else STILL
-        state, ahead = self._plan(state, sensed, wanted, senses, circles)
+        state, ahead = self._plan(state, sensed, wanted)
         state, reference_zmp, reference_dcm = self._adjusted(state, sensed, ahead)
         zmp = self._feedback(state, sensed, reference_zmp, reference_dcm)
         state = self._follow(state, sensed, zmp)
@@ -208,9 +214,7 @@ class Walker:
             return state._replace(mode=Mode.STAND, correction=STILL)
         return self._begin(state, landed, state.step.foot[:2], velocity)
 
-    def _plan(
-        self, state: WalkerState, sensed: Estimate, wanted: Velocity, senses: Senses, circles: tuple[Circle, ...]
-    ) -> tuple[WalkerState, Chain]:
+    def _plan(self, state: WalkerState, sensed: Estimate, wanted: Velocity) -> tuple[WalkerState, Chain]:
         """The footsteps to come: planned again where it is time, else as they were."""
         step, gait = state.step, self.gait
         if state.mode == Mode.SHIFT:
@@ -219,15 +223,13 @@ class Walker:
         if not self.config.plan_steps:
             state = state._replace(later=by_command(gait, wanted, 1 - step.stance, step.foot[2] + step.turn)[:-1])
         elif age >= self.config.lead - TICK / 2 and (state.mode == Mode.STEP or state.fallbacks):
-            state = self._planned_again(state, sensed, wanted, self._placed(sensed, senses, circles))
+            state = self._planned_again(state, sensed, wanted)
         else:
             state = state._replace(plan_age=age)
         first = rotate(step.foot[2], state.step.planned)
         return state, chain(gait, (first, *state.later), step.final)
 
-    def _planned_again(
-        self, state: WalkerState, sensed: Estimate, wanted: Velocity, circles: Float[np.ndarray, "circles 3"]
-    ) -> WalkerState:
+    def _planned_again(self, state: WalkerState, sensed: Estimate, wanted: Velocity) -> WalkerState:
         """One iteration of the predictive controller, from the measured state."""
         step = state.step
         other = state.anchors[1 - step.stance]
@@ -246,7 +248,10 @@ class Walker:
             0 if stands else 1 if step.final else walks_on,
             None if step.final or stands else (*rotate(step.foot[2], step.nominal), step.turn),
         )
-        plan = next_plan(self.problem, problem, wanted, circles, state.plan, self.config.deadline_ms)
+        plan = next_plan(self.problem, problem, wanted, state.circles, state.plan, self.config.deadline_ms)
+        if plan.obstacle and max(plan.overlap, plan.violation) > _CROSSED:
+            # linearised rows that the answer itself breaks: the command was held back already, walk on by it
+            plan = next_plan(self.problem, problem, wanted, NONE, state.plan, self.config.deadline_ms)
         fallbacks = 0 if plan.status == Status.SOLVED else state.fallbacks + 1
         state = state._replace(plan=plan, plan_age=0.0, fallbacks=fallbacks)
         if stands:
@@ -310,7 +315,8 @@ class Walker:
             limits = limits._replace(earliest=goal.end, latest=goal.end)
         if not self.config.adapt_steps:
             limits = limits._replace(least=goal.displacement, most=goal.displacement)
-        chosen = adjust(self.config.step, self.gait.omega, x0, step.phase, step.end, goal, limits)
+        rows = clear_of(self.gait, step, state.circles)
+        chosen = adjust(self.config.step, self.gait.omega, x0, step.phase, step.end, goal, limits, rows)
         far = math.hypot(chosen.displacement[0] - goal.displacement[0], chosen.displacement[1] - goal.displacement[1])
         return step._replace(landing=chosen.displacement, end=chosen.end, moved=step.moved or far > _FAR)
 
