@@ -6,6 +6,8 @@ Whole iterations, assembly and solver. The named peer in the same run is the sin
 walkers. Moments of a walk at random, half of them pushed, all between up to three circles; a last plan is at hand.
 """
 
+# pyright: reportMissingImports=false
+# the tests are on the path, see above
 from __future__ import annotations
 
 import argparse

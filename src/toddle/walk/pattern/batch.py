@@ -267,7 +267,8 @@ def step_batch(
 ) -> BatchWalk:
     """One iteration of each; it lasts a sample, or what is left of the step. Commands are capped to what fits.
 
-    As `reduced.Reduced.step`; the plan in the answer is the one that was followed.
+    As `reduced.Reduced.step`; the plan in the answer is the one that was followed. A walker's landing has to be held for
+    longer than a sample: make the problem with ``freeze`` of one and a half, as `reduced.Reduced` does.
     """
     dtype = walk.at.com.dtype
     velocities = jax.vmap(partial(cap, problem.gait))(jnp.asarray(velocities, dtype))
