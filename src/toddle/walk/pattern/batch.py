@@ -267,7 +267,7 @@ def step_batch(
 ) -> BatchWalk:
     """One iteration of each; it lasts a sample, or what is left of the step. Commands are capped to what fits.
 
-    As `reduced.Reduced.step`; the plan in the answer is the one that was followed. A walker's landing has to be held for
+    As `reduced.Reduced.step`; the plan in the answer is the one that was followed. A landing has to be held for
     longer than a sample: make the problem with ``freeze`` of one and a half, as `reduced.Reduced` does.
     """
     dtype = walk.at.com.dtype
