@@ -97,6 +97,7 @@ class WalkerState(NamedTuple):
         plan_age: see plan.
         later: displacements of the footsteps after the landing under way, in the plan's frame [m].
         circles: obstacles near the robot, in the plan's frame: centre and radius [m].
+        held: an obstacle holds the command back.
         fallbacks: plans that could not be used, one after another.
     """
 
@@ -120,6 +121,7 @@ class WalkerState(NamedTuple):
     plan_age: float
     later: tuple[Pair, ...]
     circles: Float[np.ndarray, "circles 3"]
+    held: bool
     fallbacks: int
 
 

@@ -96,7 +96,7 @@ class Walker:
         step = begin(self.gait, RIGHT, foot, (0.0, 0.0), ahead, 0.0, True)
         return WalkerState(
             0.0, Mode.STAND, step, 0.0, feet.copy(), feet, still, still, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0),
-            (0.5, 0.5), self.humanoid.home, STILL, (), None, None, math.inf, (), NONE, 0,
+            (0.5, 0.5), self.humanoid.home, STILL, (), None, None, math.inf, (), NONE, False, 0,
         )  # fmt: skip
 
     def step(
@@ -119,10 +119,12 @@ class Walker:
             state = self._settled_on(state, sensed)
         state = state._replace(t=state.t + TICK, estimate=sensed, circles=self._placed(sensed, senses, circles))
         if len(state.circles):
-            x, y = state.anchors[:, :2].mean(axis=0).tolist()
-            velocity = cap(held_back(velocity, state.circles, (x, y, sensed.yaw), self.gait), self.gait)
+            asked, velocity = velocity, self._held_back(state, sensed, velocity)
+            state = state._replace(held=velocity != asked)
         state = self._change_mode(state, sensed, velocity)
         wanted = _sum(velocity, state.correction) if moving(velocity) else STILL
+        if len(state.circles):
+            wanted = self._held_back(state, sensed, wanted)
         state, ahead = self._plan(state, sensed, wanted)
         state, reference_zmp, reference_dcm = self._adjusted(state, sensed, ahead)
         zmp = self._feedback(state, sensed, reference_zmp, reference_dcm)
@@ -131,6 +133,11 @@ class Walker:
         state = state._replace(feet=feet.pose, feet_velocity=feet.velocity, feet_acceleration=feet.acceleration)
         reference = self._reference(state)
         return self._act(state, reference, sensed, wanted)
+
+    def _held_back(self, state: WalkerState, sensed: Estimate, velocity: Velocity) -> Velocity:
+        """The command, less what of it would lead into an obstacle."""
+        x, y = state.anchors[:, :2].mean(axis=0).tolist()
+        return cap(held_back(velocity, state.circles, (x, y, sensed.yaw), self.gait), self.gait)
 
     def _settled_on(self, state: WalkerState, sensed: Estimate) -> WalkerState:
         """The state at the first tick: where the floor leans, the joints lean against it from the start."""
@@ -207,7 +214,7 @@ class Walker:
         pose = _pose(anchors, landed)
         landings = (*state.landings[-2:], Landing(state.t, landed, pose, state.step.asked))
         correction = state.correction
-        if moving(velocity) and not state.step.moved and not (state.plan and state.plan.obstacle):
+        if moving(velocity) and not state.step.moved and not (state.held or (state.plan and state.plan.obstacle)):
             correction = corrected(correction, landings, self.config)
         state = state._replace(anchors=anchors, landings=landings, correction=correction)
         if not moving(velocity) and side_by_side(self.gait, state.step.foot, pose):
