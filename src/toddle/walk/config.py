@@ -37,7 +37,8 @@ class WalkConfig:
         touchdown: share of the swing after which contact ends the step.
         swing_speed: the landing is not moved farther than this takes the swing foot [m/s].
         fall_speed: how fast a swing foot that is to land at once comes down [m/s].
-        lowering: the swing foot is just over the floor so long before it is to land, and then lowered [s].
+        lowering: the swing foot is just over the floor so long before it is to land, at first [s].
+        punctual: share of a landing's lateness by which the next ones are brought forward.
         late: a step waits so long for its touchdown [s].
         shift_time: of the weight shift before the first step [s].
         lead: the next plan is made so long after the last [s].
@@ -66,6 +67,7 @@ class WalkConfig:
     swing_speed: float = 1.0
     fall_speed: float = 0.3
     lowering: float = 0.03
+    punctual: float = 0.2
     late: float = 0.15
     shift_time: float = 0.3
     lead: float = 0.1

@@ -92,6 +92,7 @@ class WalkerState(NamedTuple):
         q: the last posture.
         correction: added to the command by the integral.
         landings: the last three touchdowns.
+        lowering: the swing foot is brought down so long before it is to land, learned from the touchdowns [s].
         estimate: the last one.
         plan: the last plan, and how old it is [s].
         plan_age: see plan.
@@ -116,6 +117,7 @@ class WalkerState(NamedTuple):
     q: Float[np.ndarray, " positions"]
     correction: Velocity
     landings: tuple[Landing, ...]
+    lowering: float
     estimate: Estimate | None
     plan: Plan | None
     plan_age: float

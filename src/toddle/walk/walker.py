@@ -54,6 +54,7 @@ from toddle.walk.stepping import (
 )
 
 _PERSISTS = 5  # so many unusable plans, one after another, end the walk
+_LOWERING = 0.1  # of the time by which a landing is brought forward or put off [s]
 _CROSSED = 0.01  # a plan that breaks its own rows by more is no plan [m]
 _CALM = 0.02  # a DCM this near to where it should be lets the robot stand after one more step [m]
 _SETTLING = 0.5  # no step catches a robot that has just been put down [s]
@@ -96,7 +97,7 @@ class Walker:
         step = begin(self.gait, RIGHT, foot, (0.0, 0.0), ahead, 0.0, True)
         return WalkerState(
             0.0, Mode.STAND, step, 0.0, feet.copy(), feet, still, still, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0),
-            (0.5, 0.5), self.humanoid.home, STILL, (), None, None, math.inf, (), NONE, False, 0,
+            (0.5, 0.5), self.humanoid.home, STILL, (), self.config.lowering, None, None, math.inf, (), NONE, False, 0,
         )  # fmt: skip
 
     def step(
@@ -216,7 +217,9 @@ class Walker:
         correction = state.correction
         if moving(velocity) and not state.step.moved and not (state.held or (state.plan and state.plan.obstacle)):
             correction = corrected(correction, landings, self.config)
-        state = state._replace(anchors=anchors, landings=landings, correction=correction)
+        late = state.step.phase - state.step.end
+        lowering = min(max(state.lowering + self.config.punctual * late, -_LOWERING), _LOWERING)
+        state = state._replace(anchors=anchors, landings=landings, correction=correction, lowering=lowering)
         if not moving(velocity) and side_by_side(self.gait, state.step.foot, pose):
             return state._replace(mode=Mode.STAND, correction=STILL)
         return self._begin(state, landed, state.step.foot[:2], velocity)
@@ -383,7 +386,7 @@ class Walker:
         feet = rest(feet, step.stance, state.anchors[step.stance], TICK)
         dx, dy = rotate(step.foot[2], step.landing)
         goal = (step.foot[0] + dx, step.foot[1] + dy, step.foot[2] + step.turn)
-        done, left = step.phase - step.double_support, step.end - self.config.lowering - step.phase
+        done, left = step.phase - step.double_support, step.end - state.lowering - step.phase
         return swing(feet, 1 - step.stance, goal, self.gait.step_height, done, left, TICK)
 
     def _reference(self, state: WalkerState) -> Reference:

@@ -29,6 +29,8 @@ BENT = (-0.4, 0.8, -0.4)  # hip, knee, ankle about the axis to the left [rad]
 _LEFTWARD = 0.8  # cosine; an axis nearer to the left one bends the leg forwards
 _CLOSE = 1e-6  # [m, rad]
 _CLOSE_FIVE = 2e-3  # without an ankle roll, both soles are only that flat [m, rad]
+_EASY = 0.28  # feet farther apart than this share of the centre of mass' height aren't stepped with
+_BETWEEN = 0.02  # left between two soles that stand side by side [m]
 _WIDEST = 0.8  # feet further apart than that share of the centre of mass' height are no feet
 _STRETCHES = (0.0, 0.25, 0.5, 0.75, -0.5, -1.0)  # heights tried where none is given: 0 bent legs, 1 straight ones
 _MARGIN = (0.1, 0.2)  # of the sole's length and width
@@ -176,6 +178,11 @@ def _gait(
             f"its feet would be {distance:.2f} m apart under a centre of mass {max(height, bent):.2f} m high",
             where=where,
             remedy="name the feet with left_foot and right_foot, or give foot_distance and com_height",
+        )
+    if settings.foot_distance is None and distance > _EASY * height:
+        said["foot_distance"] = distance = max(_EASY * height, sole.width + _BETWEEN)
+        notes.append(
+            f"foot_distance drawn in to {distance:.3f} m: narrow soles can't take the weight over a wider stance"
         )
     scale = height / ICUB_HEIGHT
     pace = float(np.sqrt(scale))
