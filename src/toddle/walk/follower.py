@@ -29,10 +29,11 @@ from toddle.walk.pattern.document import Document
 from toddle.walk.pattern.swing import evaluate, quintic
 from toddle.walk.pattern.time_stepping import advance, zero_moment_point
 from toddle.walk.pattern.trajectory import swing
+from toddle.walk.placing import placed
 from toddle.walk.posture.model import posture_model
 from toddle.walk.posture.solve import posture_target, solve_posture
-from toddle.walk.posture.survey import static_torques, survey
-from toddle.walk.state import Action, Landing, Mode, Pose
+from toddle.walk.servo import sag
+from toddle.walk.state import Action, Landing, Mode, Pose, pose_of
 from toddle.walk.stepping import moving
 
 _ROUNDING = 1e-9
@@ -64,7 +65,7 @@ class Follower:
         """Standing at home, the plan's origin between the soles."""
         feet = np.zeros((3, 2, 4))
         feet[0, LEFT, 1], feet[0, RIGHT, 1] = self.gait.foot_distance / 2, -self.gait.foot_distance / 2
-        step = Stride(LEFT, _pose(feet[0], LEFT), self.gait.double_support, 0.0)
+        step = Stride(LEFT, pose_of(feet[0], LEFT), self.gait.double_support, 0.0)
         return FollowerState(
             0.0, Mode.STAND, step, 0.0, np.zeros((2, 3)), feet, (0.0, 0.0), Mode.STAND, self.pattern.start(), None,
             feet[0].copy(), (0.5, 0.5), self.humanoid.home, (), None,
@@ -87,16 +88,19 @@ class Follower:
         sensed = estimate(self.observer, senses, state.anchors, np.array(state.load), state.estimate, TICK)
         before = state.interval
         state = state._replace(t=state.t + TICK, since=state.since + TICK, estimate=sensed)
-        state = self._go_on(state, sensed, velocity, self._placed(sensed, senses, circles))
+        around = placed(self.observer.model, sensed, senses, circles)
+        state = self._go_on(state, sensed, velocity, tuple(Circle(*row) for row in around.tolist()))
         reference = self._reference(state)
-        load = self._load(state, reference.zmp)
+        x, y = reference.zmp.tolist()
+        load = support.load_share(state.anchors, (x, y), state.step.stance if _single(state) else None)
         state = state._replace(load=load)
         reference = reference._replace(load=np.array(load))
         started = time.perf_counter()
         posture = solve_posture(self.observer.model, state.q, posture_target(reference), 2)
         servo = posture.q[7:]
         if self.config.feed_forward:
-            servo = servo + self._sag(posture.q, state, reference.zmp)
+            pressed = self._pressed(state, reference.zmp)
+            servo = servo + sag(self.humanoid, self.observer.model, posture.q, reference.load, pressed)
         took = 1e3 * (time.perf_counter() - started)
         plan = None if state.interval is before else state.interval
         action = Action(servo, reference, sensed, plan, took, float(posture.misses.max()), velocity)
@@ -104,10 +108,8 @@ class Follower:
 
     def area(self, state: FollowerState) -> support.Corners:
         """The area of the soles that stand, counter-clockwise."""
-        if _single(state):
-            return support.sole_corners(self.gait, *state.step.foot)
-        both = [support.sole_corners(self.gait, *_pose(state.anchors, side)) for side in (LEFT, RIGHT)]
-        return support.hull([*both[0], *both[1]])
+        soles = [state.step.foot] if _single(state) else [pose_of(state.anchors, side) for side in (LEFT, RIGHT)]
+        return support.area(self.gait, soles)
 
     def _go_on(
         self, state: FollowerState, sensed: Estimate, velocity: Velocity, circles: tuple[Circle, ...]
@@ -116,7 +118,7 @@ class Follower:
         if state.mode == Mode.STAND:
             if not moving(velocity):
                 return state
-            return self._shift(state._replace(landings=()), _pose(state.anchors, LEFT), self._aside(), Mode.STEP)
+            return self._shift(state._replace(landings=()), pose_of(state.anchors, LEFT), self._aside(), Mode.STEP)
         if state.mode == Mode.SHIFT:
             if state.since < self._shift_time(state) - _ROUNDING:
                 return state
@@ -158,7 +160,7 @@ class Follower:
 
     def _first(self, state: FollowerState) -> FollowerState:
         """The pattern begins anew from where the robot stands."""
-        left, right = (_pose(state.anchors, side) for side in (LEFT, RIGHT))
+        left, right = (pose_of(state.anchors, side) for side in (LEFT, RIGHT))
         yaw = np.zeros((2, 3))
         yaw[:, 0] = state.anchors[:, 3]
         pattern = self.pattern.start()
@@ -186,7 +188,7 @@ class Follower:
         anchors = state.anchors.copy()
         anchors[landed] = state.feet[0, landed]
         anchors[landed, 2] = 0.0
-        x, y, yaw = state.landings[-1].pose if state.landings else _pose(state.anchors, stance)
+        x, y, yaw = state.landings[-1].pose if state.landings else pose_of(state.anchors, stance)
         one, other = sensed.soles[stance], sensed.soles[landed]
         dx, dy = rotate(yaw - float(one[3]), (float(other[0] - one[0]), float(other[1] - one[1])))
         turned = math.remainder(float(other[3] - one[3]), 2 * math.pi)
@@ -207,33 +209,10 @@ class Follower:
         yaw = feet[..., 3].mean(axis=1)
         return Reference(state.t, com, zmp, yaw, feet[0], feet[1], feet[2], np.array(state.load))
 
-    def _load(self, state: FollowerState, zmp: Float[np.ndarray, "2"]) -> tuple[float, float]:
-        """How the weight is shared by feet that both stand: by the ZMP's place on the line between them."""
-        if _single(state):
-            return (1.0, 0.0) if state.step.stance == LEFT else (0.0, 1.0)
-        left, right = state.anchors[LEFT, :2], state.anchors[RIGHT, :2]
-        share = float((zmp - right) @ (left - right) / ((left - right) @ (left - right)))
-        share = min(max(share, 0.0), 1.0)
-        return share, 1.0 - share
-
-    def _sag(
-        self, q: Float[np.ndarray, " positions"], state: FollowerState, zmp: Float[np.ndarray, "2"]
-    ) -> Float[np.ndarray, " joints"]:
-        """How far the servos must be commanded ahead so as to hold their load [rad]."""
-        load = np.array(state.load)
-        dx, dy = (zmp - load @ state.anchors[:, :2]).tolist()
-        pressed = np.array([rotate(-float(yaw), (dx, dy)) for yaw in state.anchors[:, 3]])
-        torque = static_torques(self.observer.model, q, load, pressed)
-        return np.clip(torque, -self.humanoid.effort, self.humanoid.effort) / self.humanoid.stiffness
-
-    def _placed(self, sensed: Estimate, senses: Senses, circles: tuple[Circle, ...]) -> tuple[Circle, ...]:
-        """Obstacles in the plan's frame; none where the robot does not know its place."""
-        if not circles or not np.isfinite(senses.place).all():
-            return ()
-        x, y = survey(self.observer.model, sensed.q).waist_p[:2].tolist()
-        east, north, heading = senses.place.tolist()
-        placed = [rotate(sensed.yaw - heading, (c.x - east, c.y - north)) for c in circles]
-        return tuple(Circle(x + dx, y + dy, c.radius) for (dx, dy), c in zip(placed, circles, strict=True))
+    def _pressed(self, state: FollowerState, zmp: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2 2"]:
+        """Where each sole is pressed, in its frame [m]: as far from its origin as the ZMP is from the load's middle."""
+        dx, dy = (zmp - np.array(state.load) @ state.anchors[:, :2]).tolist()
+        return np.array([rotate(-float(yaw), (dx, dy)) for yaw in state.anchors[:, 3]])
 
 
 def follower(humanoid: Humanoid, gait: Gait, config: FollowerConfig | None = None) -> Follower:
@@ -267,8 +246,3 @@ def follower(humanoid: Humanoid, gait: Gait, config: FollowerConfig | None = Non
 
 def _single(state: FollowerState) -> bool:
     return state.mode == Mode.STEP and state.step.phase >= state.step.double_support - _ROUNDING
-
-
-def _pose(poses: Float[np.ndarray, "2 4"], side: int) -> Pose:
-    x, y, _, yaw = poses[side].tolist()
-    return x, y, yaw

@@ -147,3 +147,9 @@ class Action(NamedTuple):
     posture_ms: float
     posture_residual: float
     velocity: Velocity
+
+
+def pose_of(poses: Float[np.ndarray, "2 4"], side: int) -> Pose:
+    """x, y [m] and yaw [rad] of one sole of both."""
+    x, y, _, yaw = poses[side].tolist()
+    return x, y, yaw

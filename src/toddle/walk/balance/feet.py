@@ -18,7 +18,7 @@ _LOWERING = 0.08  # a foot that should have landed goes on down so fast [m/s]
 _LOWEST = -0.03  # and stops there, where there is no floor [m]
 _SETTLE = 0.04  # time constant by which a landed foot's reference comes to the floor [s]
 _LEAST_TIME = 0.02  # [s]
-_PRESS = -0.002  # height
+_OVER = 0.002  # the swing foot comes down to so far over the floor, until its step ends [m]
 _PLANAR, _HEIGHT = [0, 1, 3], [2]
 
 
@@ -50,7 +50,7 @@ def swing(
         now[0, 2], now[1, 2] = max(now[0, 2] - _LOWERING * dt, _LOWEST), -_LOWERING
         return _with(feet, side, now)
     to_apex = (left - done) / 2
-    top, until = (height, to_apex) if to_apex > _LEAST_TIME else (-_PRESS, left)
+    top, until = (height, to_apex) if to_apex > _LEAST_TIME else (_OVER, left)
     now[:, _PLANAR] = evaluate(quintic(now[:, _PLANAR], np.array(goal), left), min(dt, left))
     now[:, _HEIGHT] = evaluate(quintic(now[:, _HEIGHT], np.array([top]), until), min(dt, until))
     return _with(feet, side, now)

@@ -23,6 +23,8 @@ from jaxtyping import Float
 
 from toddle.walk.balance.pendulum import Pair
 
+_SOFT = 8  # DAQP's mark of a row that may be broken, at a price
+
 
 @dataclass(frozen=True)
 class StepWeights:
@@ -136,6 +138,3 @@ def _with_rows(
     sense = np.zeros(5 + len(rows), np.int32)
     sense[5:] = _SOFT
     return normals, np.concatenate([upper, np.full(len(rows), 1e30)]), np.concatenate([lower, rows[:, 2]]), sense
-
-
-_SOFT = 8

@@ -5,7 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+from jaxtyping import Float
+
 from toddle.robots.gait import Gait
+from toddle.robots.humanoid import LEFT, RIGHT
 from toddle.walk.balance.pendulum import Pair
 
 Corners = list[Pair]
@@ -18,6 +22,29 @@ def sole_corners(gait: Gait, x: float, y: float, yaw: float, share: float = 1.0)
     ahead = gait.foot_ahead
     box = ((ahead + length, -width), (ahead + length, width), (ahead - length, width), (ahead - length, -width))
     return [(x + cos * a - sin * b, y + sin * a + cos * b) for a, b in box]
+
+
+def area(gait: Gait, soles: Sequence[tuple[float, float, float]], share: float = 1.0) -> Corners:
+    """Of one sole or of both, poses x, y [m] and yaw [rad]; counter-clockwise [m]; ``share`` shrinks each sole."""
+    corners = [sole_corners(gait, *pose, share) for pose in soles]
+    return corners[0] if len(corners) == 1 else hull([*corners[0], *corners[1]])
+
+
+def load_share(soles: Float[np.ndarray, "2 4"], zmp: Pair, carries: int | None) -> Pair:
+    """How the weight is shared: by the ZMP's place on the line between feet that both stand; a part each of 1.
+
+    Args:
+        soles: poses, left and right.
+        zmp: zero moment point [m].
+        carries: side of the only foot that stands; None: both do.
+    """
+    if carries is not None:
+        return (1.0, 0.0) if carries == LEFT else (0.0, 1.0)
+    (lx, ly), (rx, ry) = soles[LEFT, :2].tolist(), soles[RIGHT, :2].tolist()
+    dx, dy = lx - rx, ly - ry
+    share = ((zmp[0] - rx) * dx + (zmp[1] - ry) * dy) / max(dx * dx + dy * dy, 1e-9)
+    share = min(max(share, 0.0), 1.0)
+    return share, 1.0 - share
 
 
 def hull(points: Sequence[Pair]) -> Corners:
