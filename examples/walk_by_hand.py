@@ -8,17 +8,14 @@ your own robot may stand in for the simulation: it answers ``reset`` and ``tick`
 
 import math
 
-from toddle.outside.simulation.humanoid import HumanoidSimulation
-from toddle.robots.humanoids import load_humanoid
-from toddle.signals import Velocity
-from toddle.walk.walker import walker
+import toddle
 
-robot = load_humanoid("heicub")
-controller, body = walker(robot), HumanoidSimulation(robot)
+robot = toddle.load_humanoid("heicub")
+controller, body = toddle.walker(robot), toddle.HumanoidSimulation(robot)
 state, senses = controller.start(), body.reset()
 
 while state.t < 6.0:
-    velocity = Velocity(vx=min(0.2, 0.3 * state.t), vy=0.0, omega=0.1)  # [m/s, m/s, rad/s]
+    velocity = toddle.Velocity(vx=min(0.2, 0.3 * state.t), vy=0.0, omega=0.1)  # [m/s, m/s, rad/s]
     state, action = controller.step(state, velocity, senses)
     senses = body.tick(action.servo)
 

@@ -4,6 +4,9 @@
     skill = toddle.learn(robot, samples=20_000, seed=0)
     answer = toddle.solve(skill, [0.2, -0.4, 0.6])
 
+    robot = toddle.load_humanoid("heicub")
+    controller, body = toddle.walker(robot), toddle.HumanoidSimulation(robot)
+
 Names are resolved when they are first used, so that importing the package costs nothing.
 """
 
@@ -13,6 +16,7 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from toddle.outside.simulation.humanoid import HumanoidSimulation as HumanoidSimulation
     from toddle.outside.skills import load_skill as load_skill
     from toddle.outside.skills import save as save
     from toddle.reach.api import evaluate as evaluate
@@ -20,8 +24,12 @@ if TYPE_CHECKING:
     from toddle.reach.skill import Skill as Skill
     from toddle.reach.skill import solve as solve
     from toddle.robots.catalogue import load as load
+    from toddle.robots.humanoids import load_humanoid as load_humanoid
+    from toddle.signals import Circle as Circle
     from toddle.signals import Solution as Solution
+    from toddle.signals import Velocity as Velocity
     from toddle.signals import Verdict as Verdict
+    from toddle.walk.walker import walker as walker
 
 _HOMES = {
     "load": "robots.catalogue",
@@ -33,9 +41,29 @@ _HOMES = {
     "load_skill": "outside.skills",
     "Solution": "signals",
     "Verdict": "signals",
+    "load_humanoid": "robots.humanoids",
+    "walker": "walk.walker",
+    "HumanoidSimulation": "outside.simulation.humanoid",
+    "Velocity": "signals",
+    "Circle": "signals",
 }
 
-__all__ = ["Skill", "Solution", "Verdict", "evaluate", "learn", "load", "load_skill", "save", "solve"]
+__all__ = [
+    "Circle",
+    "HumanoidSimulation",
+    "Skill",
+    "Solution",
+    "Velocity",
+    "Verdict",
+    "evaluate",
+    "learn",
+    "load",
+    "load_humanoid",
+    "load_skill",
+    "save",
+    "solve",
+    "walker",
+]
 
 
 def __getattr__(name: str) -> object:

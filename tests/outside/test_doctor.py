@@ -19,11 +19,13 @@ CORE_LACK = Finding("jax", False, "not installed", core=True, remedy="get jax")
 
 def test_this_machine_is_whole() -> None:
     findings = {finding.part: finding for finding in doctor.examine()}
-    assert {"Python", "jax", "mujoco", "JAX devices", "GL backend", "loopback port"} <= findings.keys()
+    parts = {"Python", "jax", "mujoco", "numba", "JAX devices", "GL backend", "ffmpeg", "heicub", "loopback port"}
+    assert parts <= findings.keys()
     assert all(finding.present for finding in findings.values() if finding.core)
     assert all(finding.found for finding in findings.values())
     assert all(finding.remedy for finding in findings.values() if not finding.present)
     assert findings["JAX devices"].found.startswith("cpu:0")
+    assert findings["heicub"].found == "15 joints, 25.96 kg"
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,8 @@ COMMANDS = {
 _EXAMPLES = """\
   toddle reach nicu                                a humanoid's arm learns, live
   toddle reach my/arm.urdf --tip hand              your own robot
-  toddle walk --keys                               drive a humanoid from the terminal
+  toddle walk                                      a humanoid walks, in physics
+  toddle walk --keys                               drive it from the terminal
   toddle doctor                                    is everything here?"""
 
 

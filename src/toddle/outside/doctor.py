@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import platform
 import re
-import shutil
 import socket
 import subprocess
 import sys
@@ -35,6 +34,12 @@ renderer.update_scene(data)
 assert renderer.render().any()
 print("draws")
 """
+_ASK_FFMPEG = "import imageio_ffmpeg as film; print(film.get_ffmpeg_version())"
+_ASK_HUMANOID = """\
+from toddle.robots.humanoids import load_humanoid
+robot = load_humanoid("heicub")
+print(f"{len(robot.joints)} joints, {robot.mass:.2f} kg")
+"""
 
 
 @dataclass(frozen=True)
@@ -58,10 +63,10 @@ class Finding:
 
 def examine() -> tuple[Finding, ...]:
     """Look at this machine; takes a few seconds, most of them for the first picture of each GL backend."""
-    slow: tuple[Callable[[], Finding], ...] = (_jax_devices, _gl_backend)
+    slow: tuple[Callable[[], Finding], ...] = (_jax_devices, _gl_backend, _ffmpeg, _humanoid)
     with ThreadPoolExecutor(len(slow)) as pool:
         asked = [pool.submit(ask) for ask in slow]
-        quick = [_python(), *_packages(), *_extras(), _cache(), _port(), _machine(), _ffmpeg()]
+        quick = [_python(), *_packages(), *_extras(), _cache(), _port(), _machine()]
         return (*quick, *(answer.result() for answer in asked))
 
 
@@ -79,7 +84,7 @@ def _packages() -> Iterator[Finding]:
 
 def _extras() -> list[Finding]:
     return [
-        _package("icub-models", remedy="pip install 'toddle[icub]'"),
+        _package("example-robot-data", remedy="pip install 'toddle[humanoids]'"),
         _package("robot-descriptions", remedy="pip install 'toddle[descriptions]'"),
     ]
 
@@ -137,8 +142,15 @@ def _machine() -> Finding:
 
 
 def _ffmpeg() -> Finding:
-    path = shutil.which("ffmpeg")
-    return Finding("ffmpeg", bool(path), path or "not on PATH", remedy="sudo apt-get install ffmpeg")
+    """What writes films; the package imageio-ffmpeg brings it along."""
+    good, answer = _ask(_ASK_FFMPEG)
+    return Finding("ffmpeg", good, answer, remedy="pip install --force-reinstall imageio-ffmpeg")
+
+
+def _humanoid() -> Finding:
+    """The robot that walks when none is named, read with all its meshes."""
+    good, answer = _ask(_ASK_HUMANOID)
+    return Finding("heicub", good, answer, remedy="pip install --force-reinstall icub-models")
 
 
 def _ask(code: str, **environment: str) -> tuple[bool, str]:

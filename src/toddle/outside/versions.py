@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 from importlib.metadata import PackageNotFoundError, version
 
-_PACKAGES = ("toddle", "jax", "jaxlib", "equinox", "mujoco", "numpy")
+_PACKAGES = ("toddle", "jax", "jaxlib", "equinox", "mujoco", "numpy", "numba", "daqp", "gymnasium")
 
 
 def versions() -> dict[str, str]:
