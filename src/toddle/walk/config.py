@@ -53,12 +53,12 @@ class WalkConfig:
     follow_measured: bool = True
     plan_steps: bool = True
     step: StepWeights = field(default_factory=StepWeights)
-    zmp_gain: float = 2.0
+    zmp_gain: float = 1.7
     pressed: float = 1.0
     follow: float = 0.1
     offset_time: float = 1.0
     offset_most: float = 0.03
-    velocity_gain: float = 0.3
+    velocity_gain: float = 0.15
     velocity_most: tuple[float, float] = (0.08, 0.2)
     earliest: float = 0.33
     latest: float = 1.15
@@ -67,7 +67,7 @@ class WalkConfig:
     swing_speed: float = 1.0
     fall_speed: float = 0.3
     lowering: float = 0.03
-    punctual: float = 0.2
+    punctual: float = 0.05
     late: float = 0.15
     shift_time: float = 0.3
     lead: float = 0.1
