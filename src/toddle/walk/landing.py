@@ -23,6 +23,7 @@ from toddle.walk.pattern.nmpc_problem import GAP
 from toddle.walk.state import Mode, Step, WalkerState
 from toddle.walk.stepping import Chain, shift_zmp
 
+_BETWEEN = 0.01  # left between two soles when a push is caught [m]
 _NEAR = 0.6  # obstacles farther than this from a landing don't matter to it [m]
 _TOUCH = 0.04  # between the decision to land at once and the touchdown [s]
 _MOVED = 0.03  # a landing this far from the plan was moved by a push, not by the gait's own error [m]
@@ -167,4 +168,5 @@ def _overlap(low: float, high: float, least: float, most: float) -> Pair:
 def landing_box(gait: Gait) -> tuple[float, float, float]:
     """How far ahead or back a foot may land from the other to catch a push, and how near and far aside [m]."""
     scale = gait.com_height / 0.465
-    return 0.24 * scale, gait.foot_distance - 0.02 * scale, gait.foot_distance + 0.16 * scale
+    inner = max(gait.foot_distance - 0.035 * scale, gait.foot_width + _BETWEEN)
+    return 0.24 * scale, min(inner, gait.foot_distance), gait.foot_distance + 0.16 * scale
