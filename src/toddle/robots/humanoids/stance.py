@@ -179,8 +179,9 @@ def _gait(
             where=where,
             remedy="name the feet with left_foot and right_foot, or give foot_distance and com_height",
         )
-    if settings.foot_distance is None and distance > _EASY * height:
-        said["foot_distance"] = distance = max(_EASY * height, sole.width + _BETWEEN)
+    easy = max(_EASY * height, sole.width + _BETWEEN)
+    if settings.foot_distance is None and distance > easy:
+        said["foot_distance"] = distance = easy
         notes.append(
             f"foot_distance drawn in to {distance:.3f} m: narrow soles can't take the weight over a wider stance"
         )
