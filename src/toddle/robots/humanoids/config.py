@@ -34,7 +34,7 @@ def found(spec: str, config: Path | None) -> tuple[Path, Settings]:
         build = HUMANOIDS[spec].build
         if build is None:
             raise BadInput(
-                "it is a gait without a body", where=spec, remedy="add --pattern-only, or name another robot"
+                "it is a gait alone, without a body", where=spec, remedy="add --pattern-only, or name another robot"
             )
         path, known = build()
         return path, known if config is None else _overlaid(known, read_settings(config)[1])
