@@ -5,6 +5,8 @@ Between its plans they stay as they are; where a plan can't be used the last one
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from toddle.robots.gait import Gait
@@ -14,7 +16,7 @@ from toddle.walk.clearance import held_back
 from toddle.walk.config import TICK, WalkConfig
 from toddle.walk.pattern.displacement import rotate
 from toddle.walk.pattern.feasible import cap
-from toddle.walk.pattern.nmpc import NEVER, Nmpc, PlanState
+from toddle.walk.pattern.nmpc import NEVER, Nmpc, Plan, PlanState
 from toddle.walk.pattern.nmpc import plan as next_plan
 from toddle.walk.pattern.obstacles import NONE
 from toddle.walk.pattern.plan import Status
@@ -22,6 +24,7 @@ from toddle.walk.state import Mode, WalkerState
 from toddle.walk.stepping import Chain, by_command, chain, moving
 
 _CROSSED = 0.01  # a plan that breaks its own rows by more is no plan [m]
+_LEAPS = 0.06  # nor is one in which an obstacle moves the landing under way by more [m]
 
 
 def allowed(gait: Gait, state: WalkerState, sensed: Estimate, velocity: Velocity) -> Velocity:
@@ -56,12 +59,20 @@ def planned(
     return state, chain(gait, (first, *state.later), step.final)
 
 
+def _astray(plan: Plan, at: PlanState) -> bool:
+    """Whether rows linearised too far away have misled a plan: it breaks its own rows, or leaps from where it was."""
+    if max(plan.overlap, plan.violation) > _CROSSED:
+        return True
+    x, y = plan.displacement[0].tolist()
+    return at.first is not None and math.hypot(x - at.first[0], y - at.first[1]) > _LEAPS
+
+
 def _again(problem: Nmpc, config: WalkConfig, state: WalkerState, sensed: Estimate, wanted: Velocity) -> WalkerState:
     """One iteration of the predictive controller, from the measured state."""
     step, at = state.step, _seen(problem.gait, state, sensed, wanted)
     plan = next_plan(problem, at, wanted, state.circles, state.plan, config.deadline_ms)
-    if plan.obstacle and max(plan.overlap, plan.violation) > _CROSSED:
-        # linearised rows that the answer itself breaks: the command was held back already, walk on by it
+    if plan.obstacle and _astray(plan, at):
+        # the command was held back already: walk on by it
         plan = next_plan(problem, at, wanted, NONE, state.plan, config.deadline_ms)
     fallbacks = 0 if plan.status == Status.SOLVED else state.fallbacks + 1
     state = state._replace(plan=plan, plan_age=0.0, fallbacks=fallbacks)
