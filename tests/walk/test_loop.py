@@ -70,9 +70,10 @@ def test_seconds_cut_at_once(walks: Walker, statue: Statue) -> None:
     np.testing.assert_allclose(np.diff([moment.t for moment in seen]), 0.01)
 
 
-def test_a_robot_that_stands_ends_with_its_commands(walks: Walker, statue: Statue) -> None:
-    assert list(walk(walks, statue, lambda t: None)) == []
-    assert len(list(walk(walks, statue, lambda t: STILL if t < 0.295 else None))) == 30
+def test_a_robot_that_stands_ends_with_its_commands_and_half_a_second_of_rest(walks: Walker, statue: Statue) -> None:
+    assert len(list(walk(walks, statue, lambda t: None))) == 50
+    assert len(list(walk(walks, statue, lambda t: STILL if t < 0.295 else None))) == 50
+    assert len(list(walk(walks, statue, lambda t: STILL if t < 0.795 else None))) == 80
 
 
 def test_one_that_walks_comes_to_stand_first(walks: Walker) -> None:

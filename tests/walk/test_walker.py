@@ -14,12 +14,12 @@ from toddle.outside.simulation.disturbances import WorldOptions
 from toddle.outside.simulation.humanoid import HumanoidSimulation
 from toddle.robots.humanoid import Humanoid
 from toddle.robots.humanoids import load_humanoid
-from toddle.signals import Circle, Senses, Velocity
+from toddle.signals import Circle, Velocity
 from toddle.walk.config import WalkConfig
 from toddle.walk.gate import STILL
 from toddle.walk.loop import CommandSource, Moment, walk
 from toddle.walk.pattern.plan import Status
-from toddle.walk.state import Mode, WalkerState
+from toddle.walk.state import Mode
 from toddle.walk.walker import Walker, walker
 
 AHEAD = Velocity(0.15, 0.0, 0.0)
@@ -145,24 +145,48 @@ def test_the_switches_are_all_there_are() -> None:
     assert len(SWITCHES) == 7
 
 
-def after(walks: Walker, world: HumanoidSimulation, ticks: int) -> tuple[WalkerState, Senses]:
+def test_a_tick_is_a_function_of_its_arguments(walks: Walker, world: HumanoidSimulation) -> None:
     state, senses = walks.start(), world.reset()
-    for _ in range(ticks):
-        state, action = walks.step(state, AHEAD, senses)
+    circles, landed = (Circle(0.6, 0.1, 0.1),), 0
+    for tick in range(180):
+        kept, felt = copy.deepcopy((state, senses))
+        after, action = walks.step(state, AHEAD, senses, circles)
+        assert same((state, senses), (kept, felt))
+        if tick % 10 == 0:
+            again, other = walks.step(kept, AHEAD, felt, circles)
+            np.testing.assert_array_equal(action.servo, other.servo)
+            assert same(after, again, timed=True)
+        landed += len(after.landings) > len(state.landings)
+        state, senses = after, world.tick(action.servo)
+    assert landed >= 2
+
+
+def test_a_foot_that_feels_no_floor_carries_after_a_while(walks: Walker, world: HumanoidSimulation) -> None:
+    state, senses = walks.start(), world.reset()
+    ends = []
+    for _ in range(150):
+        wrenches = senses.wrenches.copy()
+        if state.mode == Mode.STEP:
+            wrenches[1 - state.step.stance] = 0.0
+        after, _ = walks.step(state, AHEAD, senses._replace(wrenches=wrenches))
+        if len(after.landings) > len(state.landings):
+            ends.append(state.step.phase - state.step.end)
+        state = after
+    assert len(ends) >= 1
+    assert all(walks.config.late - 0.03 < over <= walks.config.late + 0.01 for over in ends)
+
+
+def test_the_last_step_ends_with_the_weight_between_the_feet(walks: Walker, world: HumanoidSimulation) -> None:
+    state, senses, finals = walks.start(), world.reset(), []
+    for tick in range(450):
+        before = state
+        state, action = walks.step(state, AHEAD if tick < 150 else STILL, senses)
         senses = world.tick(action.servo)
-    return state, senses
-
-
-@pytest.mark.parametrize("ticks", [0, 20, 100, 130])
-def test_a_tick_is_a_function_of_its_arguments(walks: Walker, world: HumanoidSimulation, ticks: int) -> None:
-    state, senses = after(walks, world, ticks)
-    circles = (Circle(0.6, 0.1, 0.1),)
-    kept, felt = copy.deepcopy((state, senses))
-    first, one = walks.step(state, AHEAD, senses, circles)
-    second, other = walks.step(kept, AHEAD, felt, circles)
-    np.testing.assert_array_equal(one.servo, other.servo)
-    assert same(first, second, timed=True)
-    assert same((state, senses), (kept, felt))
+        if before.mode == Mode.STEP and state.step.phase <= before.step.phase:
+            finals.append(before.step.final)
+    assert state.mode == Mode.STAND
+    assert finals[-1]
+    assert not any(finals[:2])
 
 
 def same(one: object, other: object, *, timed: bool = False) -> bool:

@@ -29,6 +29,7 @@ CommandSource = Callable[[float], Velocity | None]
 """The velocity asked for at a time [s]; None: it has ended, and the robot is to stand."""
 
 _FALLEN = 0.8  # tilt of the waist from which nothing brings it back [rad]
+_RESTING = 0.5  # standing so long shows that it stands [s]
 _STOPPING = 8.0  # the most that a stop may take [s] ...
 _STOPPING_STEPS = 5  # ... or so many steps, where they take longer
 
@@ -194,13 +195,15 @@ def walk(
     """
     senses, state, allowed = robot.reset(), walker.start(), STILL
     ended: float | None = None
+    stood = 0.0
     stopping = max(_STOPPING, _STOPPING_STEPS * walker.gait.step_time)
     while seconds is None or state.t < seconds - TICK / 2:
         asked = None if ended is not None else commands(state.t)
         if asked is None and ended is None:
             ended = state.t
         stands = state.mode == Mode.STAND and allowed == STILL
-        if ended is not None and (stands or state.t - ended > stopping):
+        stood = stood + TICK if stands else 0.0
+        if ended is not None and (stood > _RESTING + TICK / 2 or state.t - ended > stopping):
             return
         command = STILL if asked is None else asked
         allowed = gate(allowed, command, walker.gait.fastest, TICK, limited=limited)
