@@ -136,6 +136,7 @@ def test_a_computer_that_is_always_late_brings_it_to_stand(heicub: Humanoid, wor
 
 @pytest.mark.parametrize("name", SWITCHES)
 def test_each_term_can_be_switched_off(heicub: Humanoid, world: HumanoidSimulation, name: str) -> None:
+    # not for long: without follow_measured it falls after 2 s
     seen = moments(walker(heicub, replace(WalkConfig(), **{name: False})), world, lambda t: AHEAD, 1.7)
     assert not seen[-1].fell
     assert {moment.support for moment in seen} == {-1, 0, 1}
@@ -182,7 +183,7 @@ def test_the_last_step_ends_with_the_weight_between_the_feet(walks: Walker, worl
         before = state
         state, action = walks.step(state, AHEAD if tick < 150 else STILL, senses)
         senses = world.tick(action.servo)
-        if before.mode == Mode.STEP and state.step.phase <= before.step.phase:
+        if before.mode == Mode.STEP and state.landings is not before.landings:
             finals.append(before.step.final)
     assert state.mode == Mode.STAND
     assert finals[-1]
