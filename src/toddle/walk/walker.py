@@ -97,7 +97,7 @@ class Walker:
         if state.estimate is None:
             state = self._settled_on(state, sensed)
         around = placed(self.model, sensed, senses, circles)
-        state = state._replace(t=state.t + TICK, estimate=sensed, circles=around)
+        state = state._replace(t=state.t + TICK, estimate=sensed, circles=around, held=False)
         if len(around):
             asked, velocity = velocity, allowed(self.gait, state, sensed, velocity)
             state = state._replace(held=velocity != asked)

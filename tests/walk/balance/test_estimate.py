@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from box_biped import biped, biped_home, swaying
 
-from toddle.outside.simulation.disturbances import SILENT, Noise, WorldOptions
+from toddle.outside.simulation.disturbances import Noise, WorldOptions
 from toddle.outside.simulation.humanoid import HumanoidSimulation, Truth
 from toddle.robots.humanoid import Humanoid
 from toddle.signals import Senses
-from toddle.walk.balance.estimate import Estimate, Observer, ahead, estimate, observer
-from toddle.walk.balance.pendulum import advance
+from toddle.walk.balance.estimate import Estimate, Observer, estimate, observer
 from toddle.walk.posture.model import posture_model
 
 EVEN = np.array([0.5, 0.5])
@@ -89,13 +88,6 @@ def test_noise_delay_and_lag_are_borne(robot: Humanoid, watching: Observer) -> N
     assert deviations(found, pressed)[1] < 5e-3
 
 
-def test_looking_ahead_takes_back_the_delay(robot: Humanoid, watching: Observer) -> None:
-    found = swayed(robot, watching, WorldOptions(delay_s=0.03))
-    late = deviations(found, place)[1]
-    taken_back = deviations(found, lambda one, truth: ahead(watching, one, 0.032).com - truth.com)[1]
-    assert taken_back < 0.35 * late
-
-
 def test_wrong_masses_and_biased_sensors_shift_it_by_millimetres(robot: Humanoid, watching: Observer) -> None:
     bias = Noise(encoder=1e-3, force=2.0, torque=0.2, orientation=5e-3)
     found = swayed(robot, watching, WorldOptions(noise=Noise(), bias=bias, mass_error=0.1, seed=2))
@@ -168,13 +160,3 @@ def test_in_the_air_the_last_zmp_stays_and_all_is_finite(robot: Humanoid, watchi
     assert not flies.contact.any()
     for number in (flies.q, flies.com, flies.com_velocity, flies.dcm, flies.zmp):
         assert np.isfinite(number).all()
-
-
-def test_ahead_is_the_pendulum_over_a_resting_zmp(robot: Humanoid, watching: Observer) -> None:
-    now = swayed(robot, watching, WorldOptions(noise=SILENT), seconds=1.2)[-1][1]
-    later = ahead(watching, now, 0.05)
-    for axis in (0, 1):
-        expected = advance(watching.omega, now.com[axis], now.com_velocity[axis], now.zmp[axis], 0.05)
-        np.testing.assert_allclose((later.com[axis], later.com_velocity[axis]), expected, rtol=1e-9)
-    # a pendulum's divergent component leaves its ZMP exponentially
-    np.testing.assert_allclose(later.dcm - now.zmp, (now.dcm - now.zmp) * math.exp(0.05 * watching.omega), rtol=1e-9)

@@ -147,22 +147,6 @@ def estimate(
     )
 
 
-def ahead(observer: Observer, now: Estimate, age: float) -> Estimate:
-    """The same robot ``age`` seconds later, its centre of mass moved on as a pendulum over the same ZMP.
-
-    Args:
-        observer: see `Observer`.
-        now: what was sensed.
-        age: how old that is [s].
-    """
-    cosh, sinh = math.cosh(observer.omega * age), math.sinh(observer.omega * age)
-    from_zmp, velocity = now.com[:2] - now.zmp, now.com_velocity[:2]
-    com, moved = now.com + age * now.com_velocity, now.com_velocity.copy()
-    com[:2] = now.zmp + cosh * from_zmp + sinh / observer.omega * velocity
-    moved[:2] = observer.omega * sinh * from_zmp + cosh * velocity
-    return now._replace(t=now.t + age, com=com, com_velocity=moved, dcm=com[:2] + moved[:2] / observer.omega)
-
-
 def _carried(last: Estimate | None) -> Bool[np.ndarray, "2"]:
     return np.zeros(2, bool) if last is None else last.contact
 
