@@ -23,7 +23,11 @@ def test_the_folder_is_the_users_cache(tmp_path: Path) -> None:
 
 
 def test_what_the_user_has_set_stays(tmp_path: Path) -> None:
-    settings = {"JAX_COMPILATION_CACHE_DIR": str(tmp_path), "XLA_PYTHON_CLIENT_PREALLOCATE": "true"}
+    settings = {
+        "JAX_COMPILATION_CACHE_DIR": str(tmp_path),
+        "NUMBA_CACHE_DIR": str(tmp_path),
+        "XLA_PYTHON_CLIENT_PREALLOCATE": "true",
+    }
     before = dict(settings)
     assert use_compile_cache(settings) == tmp_path
     assert settings == before

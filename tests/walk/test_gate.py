@@ -37,10 +37,16 @@ def test_a_number_that_is_not_finite_asks_to_stand(bad: float, place: int) -> No
 
 def test_a_steady_command_is_reached_in_the_time_that_the_limits_give() -> None:
     velocity, ticks = STILL, 0
-    while velocity != Velocity(0.3, -0.1, 0.3):
-        velocity, ticks = gate(velocity, Velocity(0.3, -0.1, 0.3), FASTEST, DT), ticks + 1
+    while velocity != Velocity(0.3, 0.0, 0.3):
+        velocity, ticks = gate(velocity, Velocity(0.3, 0.0, 0.3), FASTEST, DT), ticks + 1
         assert ticks < 1000
     assert ticks * DT == pytest.approx(0.3 / ACCELERATION, abs=1.5 * DT)
+
+
+def test_ahead_and_aside_share_an_ellipse_and_backwards_is_slower() -> None:
+    both = gate(STILL, Velocity(0.3, 0.1, 0.3), FASTEST, DT, limited=False)
+    assert both == pytest.approx((0.3 / 2**0.5, 0.1 / 2**0.5, 0.3))
+    assert gate(STILL, Velocity(-1.0, 0.0, 0.0), FASTEST, DT, limited=False).vx == pytest.approx(-0.4 * FASTEST.vx)
 
 
 def test_what_is_within_passes_unchanged() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import warnings
 from collections.abc import Generator
 from pathlib import Path
 from typing import Any
@@ -81,7 +82,10 @@ class Film:
             str(self._part), (width, height), fps=self._rate, codec="libx264", quality=7, macro_block_size=2,
             ffmpeg_log_level="error",
         )  # fmt: skip
-        writer.send(None)
+        with warnings.catch_warnings():
+            # JAX warns of any fork; this one becomes ffmpeg at once
+            warnings.simplefilter("ignore", RuntimeWarning)
+            writer.send(None)
         return writer
 
 
