@@ -49,7 +49,8 @@ def kernels_hash(files: Sequence[Path]) -> str:
 def _keep_kernels(settings: MutableMapping[str, str]) -> None:
     if "NUMBA_CACHE_DIR" in settings:
         return
-    state = kernels_hash(kernel_files(Path(__file__).parents[1] / "walk"))
+    package = Path(__file__).parents[1]
+    state = kernels_hash([*kernel_files(package / "walk"), *kernel_files(package / "reach")])
     folder = cache_home(settings) / "numba" / f"{_processor()}-{state}"
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -1,0 +1,1 @@
+"""Learning the body: forward models q -> x fitted to a few movements, to be solved afterwards."""
