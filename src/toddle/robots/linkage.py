@@ -41,14 +41,14 @@ def linkage_of(chain: Chain) -> Linkage:
 
 def poses(linkage: Linkage, q: Float[np.ndarray, "batch joints"]) -> Float[np.ndarray, "batch 4 4"]:
     """Transforms from the base to the tip [m] for joint values [rad or m]."""
-    return _walk(linkage, q)[-1] @ linkage.tip
+    return axis_frames(linkage, q)[-1] @ linkage.tip
 
 
 def pose_slopes(
     linkage: Linkage, q: Float[np.ndarray, "batch joints"]
 ) -> tuple[Float[np.ndarray, "batch 4 4"], Float[np.ndarray, "batch 6 joints"]]:
     """The transforms, and the geometric Jacobian in the base frame: three rows of shift [m], three of turn [rad]."""
-    frames = _walk(linkage, q)
+    frames = axis_frames(linkage, q)
     tip = frames[-1] @ linkage.tip
     axis, foot = frames[..., :3, 2], frames[..., :3, 3]  # axes first, then the batch
     slides = linkage.slides[:, None, None]
@@ -57,7 +57,7 @@ def pose_slopes(
     return tip, np.einsum("abk,aj->bkj", twist, linkage.gain)
 
 
-def _walk(linkage: Linkage, q: Float[np.ndarray, "batch joints"]) -> Float[np.ndarray, "axes batch 4 4"]:
+def axis_frames(linkage: Linkage, q: Float[np.ndarray, "batch joints"]) -> Float[np.ndarray, "axes batch 4 4"]:
     """Every axis' frame after its own motion."""
     motion = q @ linkage.gain.T + linkage.offset
     slide = motion * linkage.slides

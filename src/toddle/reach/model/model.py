@@ -45,7 +45,7 @@ class PoseModel(Model, Protocol):
         ...
 
     def pose_slope(self, q: Joints) -> tuple[Float[np.ndarray, "batch 4 4"], Float[np.ndarray, "batch 6 joints"]]:
-        """The transforms, and the geometric Jacobian in the base frame: three rows of shift [m], three of turn [rad]."""
+        """The transforms, and the geometric Jacobian in the base frame: three rows shift [m], three turn [rad]."""
         ...
 
 
