@@ -25,7 +25,7 @@ def arm(request):
 def test_poses_are_those_of_the_chain(arm):
     linkage, q, body = arm
     for row, pose in zip(q, poses(linkage, q), strict=True):
-        np.testing.assert_allclose(pose, np.asarray(body.pose(row)), atol=1e-5)
+        np.testing.assert_allclose(pose, np.asarray(body.pose(np.float32(row))), atol=1e-5)
 
 
 def test_the_jacobian_agrees_with_differences(arm):
