@@ -1,3 +1,4 @@
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -25,7 +26,7 @@ def arm(request):
 def test_poses_are_those_of_the_chain(arm):
     linkage, q, body = arm
     for row, pose in zip(q, poses(linkage, q), strict=True):
-        np.testing.assert_allclose(pose, np.asarray(body.pose(np.float32(row))), atol=1e-5)
+        np.testing.assert_allclose(pose, np.asarray(body.pose(jnp.asarray(row, jnp.float32))), atol=1e-5)
 
 
 def test_the_jacobian_agrees_with_differences(arm):
@@ -53,4 +54,4 @@ def test_the_spread_is_that_of_arms_drawn_from_the_covariance():
     root = 1e-4 * rng.normal(size=(34, 34))
     q = np.zeros((1, 4))
     drawn = np.concatenate([poses(changed(linkage, root @ rng.normal(size=34)), q)[:, :3, 3] for _ in range(4000)])
-    np.testing.assert_allclose(np.cov(drawn.T), Rigid(linkage, root @ root.T).spread(q)[0], rtol=0.15, atol=1e-9)
+    np.testing.assert_allclose(np.cov(drawn.T), Rigid(linkage, root @ root.T).spread(q)[0], rtol=0.1, atol=1e-7)
