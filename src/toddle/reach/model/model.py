@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float
 Joints = Float[np.ndarray, "batch joints"]
 
 
+@runtime_checkable
 class Model(Protocol):
     """Where a learned body puts its tip."""
 
