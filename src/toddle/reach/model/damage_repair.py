@@ -1,0 +1,241 @@
+"""What happened to a rigid arm, and the arm as it is now, from the few movements since.
+
+Every hypothesis of `toddle.reach.model.damage_hypotheses` is fitted to them by Levenberg-Marquardt, all of them side by
+side, and judged by its evidence in Laplace's approximation (MacKay 1992): with the misses r in units of what noise and
+the model's own doubt explain, the numbers z in units of what was to be expected, and J the slope of r,
+
+    log p = -1/2 (r'r + z'z + log det(I + J'J)).
+
+A bend may explain whatever a slip explains, with five numbers more; the determinant is what it pays for them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.spatial.transform import Rotation
+
+from toddle.reach.model.damage_hypotheses import Family, joint_family, link_family, turn_slope
+from toddle.reach.model.rigid import PER_AXIS, Rigid, changed
+from toddle.robots.linkage import Linkage
+from toddle.signals import Experience
+
+_ROUNDS = 25
+_KEPT = 1e-3  # hypotheses that are less likely than that are forgotten when movements are chosen
+
+
+@dataclass(frozen=True)
+class Repair:
+    """What happened, and the arm as it is now.
+
+    Attributes:
+        kind: "slip", "lock", "weaken", "bend", "replace", or "nothing".
+        joint: the joint that broke, or whose link did, counted from 0 at the base; -1: none.
+        amount: the slip [rad or m], where it is locked [rad or m], what remains of its motion, how far the far end of
+            the link is from where it was [m], or how much longer the link is [m].
+        sureness: probability of this cause among all that were weighed.
+        model: the arm as it is now.
+        free: joints that still move; a solver must not use the others.
+    """
+
+    kind: str
+    joint: int
+    amount: float
+    sureness: float
+    model: Rigid
+    free: Bool[np.ndarray, " joints"]
+
+
+def repair(
+    model: Rigid,
+    since: Experience,
+    lower: Float[np.ndarray, " joints"],
+    upper: Float[np.ndarray, " joints"],
+    sensor: float,
+    *,
+    stood: Float[np.ndarray, " joints"] | None = None,
+    angle_sensor: float = 0.01,
+) -> tuple[Repair, ...]:
+    """Causes that explain the movements since the body changed, the likeliest first.
+
+    Args:
+        model: the arm as it was learned, before.
+        since: the movements made since, as few as one; orientations are used where they were seen.
+        lower: lower limits [rad or m].
+        upper: upper limits [rad or m].
+        sensor: standard deviation of a seen tip about the model on each axis [m].
+        stood: where the joints stood just before [rad or m]: that is where a joint locks; None: not known.
+        angle_sensor: standard deviation of a seen orientation about each axis [rad].
+    """
+    seen = _Seen.of(model, since, sensor, angle_sensor)
+    evidences, makers = [_nothing(model, seen, since)], [lambda: (model, 0.0)]
+    causes = [("nothing", -1)]
+    for family in (joint_family(model.linkage, since.q, lower, upper, stood), link_family(model.linkage, since.q)):
+        numbers, evidence, covariance = _fitted(family, seen)
+        for case, (kind, axis) in enumerate(zip(family.kinds, family.axes, strict=True)):
+            joint = axis if family.mean.shape[1] == 2 else int(np.argmax(np.abs(model.linkage.gain[axis])))
+            causes.append((kind, joint))
+            evidences.append(float(evidence[case]))
+            make = _joint_changed if family.mean.shape[1] == 2 else _link_changed
+            makers.append(lambda m=make, k=kind, a=axis, n=numbers[case], c=covariance[case]: m(model, k, a, n, c))
+    weight = np.exp(np.array(evidences) - max(evidences))
+    weight /= weight.sum()
+    repairs = []
+    for k in np.argsort(-weight):
+        if repairs and weight[k] < _KEPT:
+            break
+        (kind, joint), (now, amount) = causes[k], makers[k]()
+        free = np.array([not (kind == "lock" and j == joint) for j in range(since.q.shape[1])])
+        repairs.append(Repair(kind, joint, amount, float(weight[k]), now, free))
+    return tuple(repairs)
+
+
+def telling_movement(repairs: tuple[Repair, ...], candidates: Float[np.ndarray, "batch joints"], sensor: float) -> int:
+    """The candidate posture [rad or m] after which most will be known: about which cause, and how much of it.
+
+    Log determinant of what the seen tip's covariance would be over all causes, by their sureness.
+    """
+    weight = np.array([each.sureness for each in repairs])
+    tips = np.stack([each.model.forward(candidates) for each in repairs])
+    middle = np.einsum("c,cbs->bs", weight, tips) / weight.sum()
+    apart = tips - middle
+    doubt = np.einsum("c,cbs,cbt->bst", weight, apart, apart) / weight.sum()
+    for share, each in zip(weight / weight.sum(), repairs, strict=True):
+        doubt = doubt + share * each.model.spread(candidates)
+    return int(np.argmax(np.linalg.slogdet(doubt + sensor**2 * np.eye(doubt.shape[-1]))[1]))
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What was seen, and the inverse root of the covariance that noise and the model's doubt explain."""
+
+    rows: list[int]
+    x: Float[np.ndarray, "movements space"]
+    turn: Float[np.ndarray, "movements 3 3"] | None
+    white: Float[np.ndarray, "movements rows rows"]
+
+    @classmethod
+    def of(cls, model: Rigid, since: Experience, sensor: float, angle_sensor: float) -> _Seen:
+        rows = [*model.coordinates, *(() if since.turn is None else (3, 4, 5))]
+        noise = np.diag([sensor**2 if row < 3 else angle_sensor**2 for row in rows])
+        covariance = model.pose_spread(since.q)[:, rows][:, :, rows] + noise
+        return cls(rows, since.x, since.turn, np.linalg.inv(np.linalg.cholesky(covariance)))
+
+    def miss(self, pose: Float[np.ndarray, "cases movements 4 4"]) -> Float[np.ndarray, "cases residuals"]:
+        """How far what was seen is from each prediction, in units of what is explained."""
+        shape = pose.shape[:2]
+        places = [row for row in self.rows if row < 3]
+        miss = np.empty((*shape, len(self.rows)))
+        miss[..., : len(places)] = self.x - pose[..., places, 3]
+        if self.turn is not None:
+            away = self.turn @ np.swapaxes(pose[..., :3, :3], -1, -2)
+            miss[..., len(places) :] = Rotation.from_matrix(away.reshape(-1, 3, 3)).as_rotvec().reshape(*shape, 3)
+        return np.einsum("mij,cmj->cmi", self.white, miss).reshape(shape[0], -1)
+
+    def steep(
+        self, slope: Float[np.ndarray, "cases movements 6 numbers"]
+    ) -> Float[np.ndarray, "cases residuals numbers"]:
+        """The slopes of the predictions in the same units."""
+        return np.einsum("mij,cmjk->cmik", self.white, slope[:, :, self.rows]).reshape(len(slope), -1, slope.shape[3])
+
+
+def _nothing(model: Rigid, seen: _Seen, since: Experience) -> float:
+    """Evidence of an arm that is as it was."""
+    return -0.5 * float((seen.miss(model.pose(since.q)[None]) ** 2).sum())
+
+
+def _fitted(
+    family: Family, seen: _Seen
+) -> tuple[Float[np.ndarray, "cases numbers"], Float[np.ndarray, " cases"], Float[np.ndarray, "cases numbers numbers"]]:
+    """Each hypothesis' numbers, its evidence and the covariance of its numbers; the best of its starts."""
+    best = np.full(len(family.kinds), -np.inf)
+    numbers, covariance = family.mean.copy(), family.root.copy()
+    for start in family.starts:
+        z, evidence, doubt = _descended(family, seen, np.tile(start, (len(best), 1)))
+        better = evidence > best
+        best[better] = evidence[better]
+        found = family.mean + np.einsum("cij,cj->ci", family.root, z)
+        numbers[better] = found[better]
+        covariance[better] = (family.root @ doubt @ np.swapaxes(family.root, 1, 2))[better]
+    return numbers, best, covariance
+
+
+def _descended(
+    family: Family, seen: _Seen, z: Float[np.ndarray, "cases numbers"]
+) -> tuple[Float[np.ndarray, "cases numbers"], Float[np.ndarray, " cases"], Float[np.ndarray, "cases numbers numbers"]]:
+    """Levenberg-Marquardt from z, every case with its own damping: z, its evidence, and its covariance."""
+    eye, damping = np.eye(z.shape[1]), np.full(len(z), 1e-2)
+    cost, gradient, curvature = _around(family, seen, z)
+    for _ in range(_ROUNDS):
+        step = np.linalg.solve(curvature + damping[:, None, None] * eye, -gradient[..., None])[..., 0]
+        tried_cost, tried_gradient, tried_curvature = _around(family, seen, z + step)
+        good = tried_cost < cost
+        z = np.where(good[:, None], z + step, z)
+        gain = np.where(good, cost - tried_cost, 0.0)
+        cost = np.where(good, tried_cost, cost)
+        gradient = np.where(good[:, None], tried_gradient, gradient)
+        curvature = np.where(good[:, None, None], tried_curvature, curvature)
+        damping = np.where(good, damping / 10, damping * 10)
+        if (gain < 1e-4).all() and (np.abs(step).max() < 1e-3 or (damping > 1e6).all()):
+            break
+    return z, -0.5 * (cost + np.linalg.slogdet(curvature)[1]), np.linalg.inv(curvature)
+
+
+def _around(
+    family: Family, seen: _Seen, z: Float[np.ndarray, "cases numbers"]
+) -> tuple[Float[np.ndarray, " cases"], Float[np.ndarray, "cases numbers"], Float[np.ndarray, "cases numbers numbers"]]:
+    """Cost r'r + z'z, half its gradient, and the curvature I + J'J."""
+    pose, slope = family.predict(family.mean + np.einsum("cij,cj->ci", family.root, z))
+    miss, steep = seen.miss(pose), seen.steep(slope) @ family.root
+    across = np.swapaxes(steep, 1, 2)
+    gradient = z - np.einsum("cki,ci->ck", across, miss)
+    return (miss**2).sum(1) + (z**2).sum(1), gradient, np.eye(z.shape[1]) + across @ steep
+
+
+def _joint_changed(
+    model: Rigid,
+    kind: str,
+    joint: int,
+    numbers: Float[np.ndarray, "2"],
+    covariance: Float[np.ndarray, "2 2"],
+) -> tuple[Rigid, float]:
+    """The arm whose joint goes to numbers[0] + numbers[1] q, and the amount that a person is told."""
+    place, share = numbers
+    share = 0.0 if kind == "lock" else share
+    linkage = model.linkage
+    gain = linkage.gain.copy()
+    gain[:, joint] *= share
+    now = linkage._replace(gain=gain, offset=linkage.offset + linkage.gain[:, joint] * place)
+    moves = np.zeros((len(model.covariance), 2))
+    for axis, slides in enumerate(linkage.slides):
+        moves[PER_AXIS * axis + (2 if slides else 5), 0] = linkage.gain[axis, joint]
+        if kind == "weaken" and linkage.gain[axis, joint] != 0:
+            moves[PER_AXIS * axis + 6, 1] = 1 / share
+    amount = {"slip": place, "lock": place, "weaken": share}[kind]
+    return replace(model, linkage=now, covariance=model.covariance + moves @ covariance @ moves.T), float(amount)
+
+
+def _link_changed(
+    model: Rigid,
+    kind: str,
+    axis: int,
+    numbers: Float[np.ndarray, "6"],
+    covariance: Float[np.ndarray, "6 6"],
+) -> tuple[Rigid, float]:
+    """The arm whose link after an axis has its far end moved by a twist, and the amount that a person is told."""
+    first = PER_AXIS * (axis + 1)  # the tip's six numbers follow the last axis' seven
+    step = np.zeros(len(model.covariance))
+    step[first : first + 6] = numbers
+    linkage: Linkage = changed(model.linkage, step)
+    into = np.zeros((6, 6))
+    into[:3, :3] = Rotation.from_rotvec(numbers[3:]).as_matrix().T
+    into[3:, 3:] = turn_slope(numbers[None, 3:])[0].T
+    doubt = model.covariance.copy()
+    doubt[first : first + 6, first : first + 6] += into @ covariance @ into.T
+    amount = float(np.linalg.norm(numbers[:3]))
+    if kind == "replace":
+        link = model.linkage.before[axis + 1] if axis + 1 < len(model.linkage.before) else model.linkage.tip
+        amount *= float(np.sign(link[:3, 3] @ link[:3, :3] @ numbers[:3]))
+    return replace(model, linkage=linkage, covariance=doubt), amount
