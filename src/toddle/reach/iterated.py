@@ -19,7 +19,7 @@ from toddle.failures import BadInput
 from toddle.reach.explore.babble import babble, limits_of, suited_eps
 from toddle.reach.learn.bayesian_network import BayesianNetwork, Record, train
 from toddle.reach.observe import Observe
-from toddle.reach.solve.looking import looked_for
+from toddle.reach.solve.broyden import looked_for
 from toddle.robots.body import Body, Plant
 from toddle.signals import Experience
 
