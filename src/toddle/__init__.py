@@ -21,8 +21,10 @@ if TYPE_CHECKING:
     from toddle.outside.skills import save as save
     from toddle.reach.api import evaluate as evaluate
     from toddle.reach.api import learn as learn
+    from toddle.reach.api import solve as solve
+    from toddle.reach.body_skill import BodySkill as BodySkill
+    from toddle.reach.body_skill import solutions as solutions
     from toddle.reach.skill import Skill as Skill
-    from toddle.reach.skill import solve as solve
     from toddle.robots.catalogue import load as load
     from toddle.robots.humanoids import load_humanoid as load_humanoid
     from toddle.signals import Circle as Circle
@@ -35,7 +37,9 @@ _HOMES = {
     "load": "robots.catalogue",
     "learn": "reach.api",
     "evaluate": "reach.api",
-    "solve": "reach.skill",
+    "solve": "reach.api",
+    "solutions": "reach.body_skill",
+    "BodySkill": "reach.body_skill",
     "Skill": "reach.skill",
     "save": "outside.skills",
     "load_skill": "outside.skills",
@@ -49,6 +53,7 @@ _HOMES = {
 }
 
 __all__ = [
+    "BodySkill",
     "Circle",
     "HumanoidSimulation",
     "Skill",
@@ -61,6 +66,7 @@ __all__ = [
     "load_humanoid",
     "load_skill",
     "save",
+    "solutions",
     "solve",
     "walker",
 ]

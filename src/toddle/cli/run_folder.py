@@ -15,12 +15,14 @@ from toddle.failures import BadInput
 if TYPE_CHECKING:
     import numpy as np
 
+    from toddle.reach.body_skill import BodySkill
     from toddle.reach.session import Cycle, Session
     from toddle.reach.skill import Skill
 
 FILES = (
-    "run.json", "run.safetensors", "skill.json", "skill.safetensors", "config.json", "figures.json", "course.json",
-    "points.json", "error.png", "explored.png", "coverage.png", "fixed.png", "seen.png",
+    "run.json", "run.safetensors", "movements.json", "movements.safetensors", "skill.json", "skill.safetensors",
+    "config.json", "figures.json", "course.json", "points.json", "error.png", "explored.png", "coverage.png",
+    "fixed.png", "seen.png", "expected.png", "misses.png", "damage.json", "damage.png",
 )  # fmt: skip
 
 
@@ -31,7 +33,7 @@ def refuse_used(out: Path | None) -> None:
     if os.path.lexists(out) and not os.path.isdir(out):
         raise BadInput("it is no folder", where=f"--out {out}", remedy="name another")
     found = [name for name in FILES if os.path.lexists(out / name)]
-    if found and found[0] == "run.json":
+    if found and found[0] in ("run.json", "movements.json"):
         raise BadInput("it holds a run already", where=str(out), remedy=f"go on with --resume {out}, or name another")
     if found:
         raise BadInput(f"its {found[0]} would be written over", where=str(out), remedy="name another with --out")
@@ -107,7 +109,7 @@ def _draw(
         pictures.targets_by_error(folder / f"{name}.png", targets, errors, title=f"{title}: {name} test set")
 
 
-def _published(skill: Skill) -> dict[str, float]:
+def _published(skill: Skill | BodySkill) -> dict[str, float]:
     """The document's figures for what was run, where it has any [mm]."""
     from toddle.robots.catalogue import record
 
@@ -115,7 +117,7 @@ def _published(skill: Skill) -> dict[str, float]:
     return dict(known.published) if known and skill.config.method == "goal-and-motor-babbling" else {}
 
 
-def tell_figures(skill: Skill, folder: Path, *, as_json: bool) -> None:
+def tell_figures(skill: Skill | BodySkill, folder: Path, *, as_json: bool) -> None:
     """Print the figures: one JSON object, or a table beside the document's."""
     from toddle.outside.files import finite
     from toddle.outside.terminal import print_table
@@ -131,11 +133,16 @@ def tell_figures(skill: Skill, folder: Path, *, as_json: bool) -> None:
     title = f"{skill.figures['robot']} after {skill.figures['samples']} movements"
     print_table(title, ("", "this run", "document"), rows)
     print(f"figures, pictures and the skill: {folder}")
-    middle = " ".join(f"{value:.3f}" for value in skill.targets[len(skill.targets) // 2])
-    print(f"ask it: toddle reach --skill {folder} --target {middle}")
+    if len(skill.targets):
+        middle = " ".join(f"{value:.3f}" for value in skill.targets[len(skill.targets) // 2])
+        print(f"ask it: toddle reach --skill {folder} --target {middle}")
 
 
 def _figure(value: object) -> str:
     if isinstance(value, float):
         return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.2f}"
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name} {_figure(inner)}" for name, inner in value.items())
+    if isinstance(value, list | tuple):
+        return " ".join(map(_figure, value))
     return str(value)

@@ -84,7 +84,7 @@ def explored_space(
 ) -> None:
     """Positions that the tip visited, and where it started [m] (figures 4.7, 4.10, 5.8, A.5-A.8)."""
     figure = new_figure(6.4, 5.4)
-    axes = _space_axes(figure, seen.shape[1])
+    axes = space_axes(figure, seen.shape[1])
     axes.scatter(*seen.T, s=3, color=OURS, alpha=0.35, linewidths=0)
     axes.scatter(*home, s=40, color=THEIRS, label="home")
     axes.set_title(title)
@@ -138,7 +138,7 @@ def targets_by_error(
 ) -> None:
     """Test targets coloured by their open-loop error, and the errors point by point (figures 4.8, C.1, C.2)."""
     figure = new_figure(10.5, 4.6)
-    axes = _space_axes(figure, targets.shape[1], 121)
+    axes = space_axes(figure, targets.shape[1], 121)
     millimetres = 1000 * errors
     dots = axes.scatter(
         *targets.T, c=millimetres, s=26, cmap="viridis", vmin=0, vmax=float(np.percentile(millimetres, 95))
@@ -153,7 +153,7 @@ def targets_by_error(
     save_figure(figure, path)
 
 
-def _space_axes(figure: Figure, space: int, position: Any = 111) -> Any:
+def space_axes(figure: Figure, space: int, position: Any = 111) -> Any:
     """Equal axes in the plane or in space [m]."""
     if space == 2:
         axes = plain_axes(figure, position)

@@ -17,8 +17,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from toddle.failures import BadInput, ToddleError
+from toddle.outside.body_skills import BODY, body_from, save_body
 from toddle.outside.files import make_folder, read_record, write_record
 from toddle.reach import loop
+from toddle.reach.body_skill import BodySkill
 from toddle.reach.config import ReachConfig
 from toddle.reach.methods import make_learner
 from toddle.reach.session import Cycle, Session, start
@@ -33,12 +35,14 @@ _BOX = ("joint_lower", "joint_span", "space_lower", "space_span")
 _PLAIN = ("home", "seen", "postures", "targets", "errors")
 
 
-def save(skill: Skill, folder: str | os.PathLike[str]) -> Path:
+def save(skill: Skill | BodySkill, folder: str | os.PathLike[str]) -> Path:
     """Save a skill; returns the folder.
 
     Raises:
         BadInput: the folder can't be made.
     """
+    if isinstance(skill, BodySkill):
+        return save_body(skill, Path(folder))
     path = make_folder(Path(folder))
     facts = {
         "source": asdict(skill.source),
@@ -54,7 +58,7 @@ def save(skill: Skill, folder: str | os.PathLike[str]) -> Path:
     return path
 
 
-def load_skill(folder: str | os.PathLike[str]) -> Skill:
+def load_skill(folder: str | os.PathLike[str]) -> Skill | BodySkill:
     """Load a saved skill; it answers as it did before, bit for bit.
 
     Raises:
@@ -63,6 +67,8 @@ def load_skill(folder: str | os.PathLike[str]) -> Skill:
     path = Path(folder)
     facts, tensors = read_record(path, "skill", _SKILL)
     try:
+        if BODY in facts:
+            return body_from(facts, tensors)
         config = _config(facts["config"])
         box = UnitBox(*(jnp.asarray(tensors[f"box.{name}"]) for name in _BOX))
         hidden = replace(config, hidden=tuple(facts["hidden"])).hidden or ()

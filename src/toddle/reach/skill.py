@@ -108,7 +108,7 @@ def _typical_gap(seen: Float[np.ndarray, "kept space"]) -> float:
     return float(np.percentile(finite, 95)) if len(finite) else 0.0
 
 
-def solve(
+def solve_inverse(
     skill: Skill,
     target: Sequence[float] | Float[np.ndarray, " space"],
     *,
@@ -116,36 +116,18 @@ def solve(
     looks: int = 3,
     tolerance: float | None = None,
 ) -> Solution:
-    """Joint values that bring the tip to a target.
+    """Joint values that bring the tip to a target; see `toddle.solve`.
 
-    Args:
-        skill: what was learned.
-        target: where the tip should go, in the base frame [m].
-        robot: the body or plant that tries the answer, so that it can be corrected by looking where the tip went;
-            None: open loop, one shot.
-        looks: how often it may be corrected.
-        tolerance: the error up to which a target counts as reached [m]; None: 5 mm where somebody looks, twice the
-            skill's mean held-out error where nobody does, but at most 5 cm.
-
-    Returns:
-        An answer within the joint limits, with the error to expect and a verdict. For a target out of reach it is
-        the answer for the nearest position that was ever visited.
-
-    Raises:
-        BadInput: the target is not as many finite numbers as the tip has coordinates, or looks or tolerance is
-            out of range.
+    For a target out of reach it is the answer for the nearest position that was ever visited.
     """
     aim = _checked_target(skill, target)
-    if looks < 1:
-        raise BadInput(f"{looks} looks", where="looks", remedy="give at least 1, or no robot for open loop")
-    if tolerance is not None and not 0 < tolerance < float("inf"):
-        raise BadInput(f"{tolerance} is out of range", where="tolerance", remedy="give a distance above 0 [m]")
     nearest, distance, reachable_within = skill.reach(aim)
     if distance > reachable_within:
         q = skill.predict(nearest[None])[0]
         where = " ".join(f"{value:.3f}" for value in nearest)
         reason = f"{1000 * distance:.0f} mm from anything it ever reached; the nearest such position is {where}"
-        return Solution(q, distance + skill.expected_error(nearest), 0, Verdict.OUT_OF_REACH, reason)
+        error = distance + skill.expected_error(nearest)
+        return Solution(q, error, 0, Verdict.OUT_OF_REACH, reason, nearest=nearest)
     if robot is None:
         q = skill.predict(aim[None])[0]
         allowed = min(2 * float(skill.errors.mean()), _COARSE) if tolerance is None else tolerance

@@ -33,6 +33,7 @@ class Chain(Body):
         offset: motion of each axis when all joints are zero [rad or m].
         tip: transform from the last axis' frame to the tip [m].
         coordinates: which of x, y, z the tip's position is reported in: (0, 1) for a planar arm.
+        links: names of the links that each axis carries, up to the next one; empty where they have none.
     """
 
     name: str = eqx.field(static=True)
@@ -46,6 +47,13 @@ class Chain(Body):
     offset: Float[Array, " axes"]
     tip: Float[Array, "4 4"]
     coordinates: tuple[int, ...] = eqx.field(static=True, default=(0, 1, 2))
+    links: tuple[tuple[str, ...], ...] = eqx.field(static=True, default=())
+
+    @property
+    def carriers(self) -> dict[str, str]:
+        """The joint that carries each link, by the link's name."""
+        moved_by = [self.joints[int(jnp.argmax(jnp.abs(row)))] for row in self.gain]
+        return {link: joint for joint, links in zip(moved_by, self.links, strict=False) for link in links}
 
     @property
     def space(self) -> int:

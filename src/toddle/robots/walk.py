@@ -196,10 +196,13 @@ def _assemble(readings: _Readings, path: list[_Step], drives: Mapping[str, _Driv
     """Multiply the constants of the path together, one product before each axis that moves."""
     rigid, still = np.eye(4), np.eye(4)
     before, slides, gains, offsets = [], [], [], []
+    carried: list[list[str]] = []
     for step in path:
         motion = readings.motion(step.joint.name)
         enter, leave = (motion.origin, still) if step.down else (still, inverse(motion.origin))
+        beyond = step.joint.child if step.down else step.joint.parent
         if step.joint.kind is Kind.FIXED:
+            _carry(carried, beyond)
             rigid = rigid @ enter @ leave
             continue
         drive, slide = drives[step.joint.name], step.joint.kind is Kind.SLIDES
@@ -211,8 +214,10 @@ def _assemble(readings: _Readings, path: list[_Step], drives: Mapping[str, _Driv
             slides.append(float(slide))
             gains.append([sign * drive.gain * (name == drive.leader) for name in actuated])
             offsets.append(sign * constant)
+            carried.append([beyond])
             rigid = still
         else:
+            _carry(carried, beyond)
             held = drive.gain * readings.held(drive.leader) if drive.gain else 0.0
             rigid = rigid @ z_motion(sign * (held + constant), slides=slide)
         rigid = rigid @ to_axis.T @ leave
@@ -228,7 +233,14 @@ def _assemble(readings: _Readings, path: list[_Step], drives: Mapping[str, _Driv
         gain=_stored(gains),
         offset=_stored(offsets),
         tip=_stored(rigid),
+        links=tuple(map(tuple, carried)),
     )
+
+
+def _carry(carried: list[list[str]], link: str) -> None:
+    """The last axis carries one more link; before the first axis nothing moves it."""
+    if carried:
+        carried[-1].append(link)
 
 
 def _stored(values: Sequence[object] | np.ndarray) -> jnp.ndarray:

@@ -1,0 +1,158 @@
+"""A run that learns the body: make movements, fit a structure to them, test on targets that nobody has seen."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from toddle.reach.body_config import BodyConfig
+from toddle.reach.body_skill import BodySkill
+from toddle.reach.evaluate.body_figures import figures_of
+from toddle.reach.evaluate.targets import fixed_targets
+from toddle.reach.gather import Sight, gather, postures, truth
+from toddle.reach.structures import Known, fit_body, structure_named, suited
+from toddle.robots.body import Body, Plant
+from toddle.robots.catalogue import Choice, record
+from toddle.signals import Experience
+
+_SURVEY = 3  # the stream of the postures that test targets come from
+_TEST_POINTS = 110  # the size of the thesis's fixed set (Mahboob 2015, section 4.2)
+_SURVEYED = 4_000
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a run is going to do.
+
+    Attributes:
+        config: the run's configuration, its method and number of movements settled where one is known.
+        names: the structures to try.
+        why: why these.
+        known: what is known of the body.
+        q: the movements to make [rad or m].
+    """
+
+    config: BodyConfig
+    names: tuple[str, ...]
+    why: str
+    known: Known
+    q: Float[np.ndarray, "movements joints"]
+
+
+def plan(body: Body | Plant, config: BodyConfig, *, like: Body | None = None) -> Plan:
+    """Settle what a run will do.
+
+    Args:
+        body: what moves.
+        config: what was asked for.
+        like: what a plant is known to be built like, where that is known.
+
+    Raises:
+        BadInput: there is no such method.
+    """
+    names, why = suited(like if like is not None else body)
+    if config.method is not None:
+        names, why = (structure_named(config.method).name,), "as asked for"
+    lower, upper, home = (np.asarray(values, float) for values in (body.lower, body.upper, body.home))
+    first = structure_named(names[0])
+    count = config.movements or (first.movements if len(names) == 1 else structure_named("curvature").movements)
+    q = postures(lower, upper, count, config.seed, _designed(lower, upper, home) if first.designed else None)
+    settled = replace(config, method=names[0] if len(names) == 1 else None, movements=count)
+    return Plan(settled, names, why, Known(tuple(body.joints), lower, upper, home), q)
+
+
+def learn_body(
+    robot: Body | Plant,
+    config: BodyConfig,
+    source: Choice,
+    *,
+    like: Body | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+    experience: Experience | None = None,
+) -> BodySkill:
+    """Let an arm learn its own body from its movements, and test what it learned.
+
+    Args:
+        robot: what moves.
+        config: what was asked for.
+        source: what `toddle.load` makes the body from.
+        like: what a plant is known to be built like, where that is known; its answers are then tested on that.
+        tell: called with what is found on the way.
+        experience: movements that were made already; None: they are made now.
+
+    Raises:
+        BadInput: the configuration doesn't fit the body, or its movements can't be learned from.
+    """
+    begun = time.perf_counter()
+    to_do = plan(robot, config, like=like)
+    sight = Sight(config.noise or 0.0, config.angle_noise, config.pose)
+    if experience is None:
+        experience = gather(robot, to_do.q, sight, config.seed)
+    skill = skill_from(experience, to_do, source, tell)
+    return tested(skill, robot, like, time.perf_counter() - begun)
+
+
+def skill_from(
+    experience: Experience, to_do: Plan, source: Choice, tell: Callable[[str], None] = lambda _: None
+) -> BodySkill:
+    """The skill that movements lead to, not yet tested."""
+    known = to_do.known
+    fit, fits = fit_body(experience, known, to_do.names, to_do.config.seed, tell)
+    space = experience.x.shape[1]
+    return BodySkill(
+        source, known.joints, known.lower, known.upper, known.home, replace(to_do.config, method=fit.kind),
+        f"{to_do.why}: {fits}", fit, experience, np.empty((0, space)), np.empty(0), {},
+    )  # fmt: skip
+
+
+def tested(skill: BodySkill, robot: Body | Plant, like: Body | None, seconds: float) -> BodySkill:
+    """The skill with its fixed test set and its figures.
+
+    Args:
+        skill: what was learned.
+        robot: what moves.
+        like: the body whose kinematics a plant has, where known: it gives the targets.
+        seconds: how long learning took.
+    """
+    config, begun = skill.config, time.perf_counter()
+    judge = robot if isinstance(robot, Body) else like
+    q = np.random.default_rng([config.seed, _SURVEY]).uniform(
+        skill.lower, skill.upper, (max(config.test_points, _SURVEYED), len(skill.joints))
+    )
+    if judge is None:
+        positions = gather(robot, q[: min(config.test_points, _TEST_POINTS)], Sight(), config.seed).x
+        turns = None
+    else:
+        positions, turns = truth(judge, q, turned=skill.turned)
+    known = record(skill.source.spec)
+    count = known.test_points if known is not None and known.test_points else _TEST_POINTS
+    fixed, _ = fixed_targets(positions, min(count, len(positions)), known.test_spacing or None if known else None)
+    skill = replace(skill, targets=fixed)
+    errors, figures = figures_of(skill, robot, judge, positions[: config.test_points], _first(turns, config))
+    seconds += time.perf_counter() - begun
+    return replace(skill, errors=errors, figures={**figures, "total_seconds": seconds})
+
+
+def fresh_figures(skill: BodySkill, robot: Body | Plant, points: int, seed: int) -> dict[str, float]:
+    """How well a learned body reaches for fresh targets, open loop and after looks; see `toddle.evaluate`."""
+    draw = np.random.default_rng([seed, _SURVEY, 1])
+    q = draw.uniform(skill.lower, skill.upper, (points, len(skill.joints)))
+    seen = gather(robot, q, Sight(turned=skill.turned), seed)
+    _, figures = figures_of(replace(skill, targets=seen.x[:_TEST_POINTS]), robot, None, seen.x, seen.turn)
+    return {name: value for name, value in figures.items() if isinstance(value, float)}
+
+
+def _first(turns: np.ndarray | None, config: BodyConfig) -> np.ndarray | None:
+    return None if turns is None else turns[: config.test_points]
+
+
+def _designed(
+    lower: Float[np.ndarray, " joints"], upper: Float[np.ndarray, " joints"], home: Float[np.ndarray, " joints"]
+) -> Float[np.ndarray, "designed joints"]:
+    from toddle.reach.explore.isolating import isolating_movements
+
+    return isolating_movements(lower, upper, home)
