@@ -24,19 +24,19 @@ class Arms(NamedTuple):
         slides: 1.0 where the axis slides, 0.0 where it turns.
         gain: motion of the axis for a unit of its motor.
         tip: transform from the last axis to the tip [m].
-        motor: which joint drives each axis; the same for all candidates.
+        motor: which joint drives each axis.
     """
 
     before: Float[np.ndarray, "arms axes 4 4"]
     slides: Float[np.ndarray, "arms axes"]
     gain: Float[np.ndarray, "arms axes"]
     tip: Float[np.ndarray, "arms 4 4"]
-    motor: Int[np.ndarray, " axes"]
+    motor: Int[np.ndarray, "arms axes"]
 
     def pick(self, which: int | np.ndarray | list[int] | slice) -> Arms:
         """Some of the candidates."""
         rows = [which] if isinstance(which, int | np.integer) else which
-        return Arms(self.before[rows], self.slides[rows], self.gain[rows], self.tip[rows], self.motor)
+        return Arms(self.before[rows], self.slides[rows], self.gain[rows], self.tip[rows], self.motor[rows])
 
 
 class Motion(NamedTuple):
@@ -156,7 +156,7 @@ def from_lines(
     through: Float[np.ndarray, "arms axes 3"],
     slides: Float[np.ndarray, "arms axes"],
     tip: Float[np.ndarray, "arms 3"],
-    motor: Int[np.ndarray, " axes"],
+    motor: Int[np.ndarray, "arms axes"],
 ) -> Arms:
     """Arms from the directions of their axes, a point on each [m], and their tips [m], all in the base's frame."""
     frames = np.zeros((*along.shape[:2], 4, 4))
@@ -174,20 +174,26 @@ def from_lines(
     return Arms(before, slides, np.ones(slides.shape), back[:, -1] @ end, motor)
 
 
+def side_by_side(groups: list[Arms]) -> Arms:
+    """All candidates of several groups."""
+    return Arms(*(np.concatenate(values) for values in zip(*groups, strict=True)))
+
+
+def recentred(arms: Arms, shift: Float[np.ndarray, " joints"]) -> Arms:
+    """The same arms for joint values that count from further on: q less the shift."""
+    motion = arms.gain * shift[arms.motor]
+    twist = np.zeros((*motion.shape, 6))
+    twist[..., 2], twist[..., 5] = motion * arms.slides, motion * (1 - arms.slides)
+    return arms._replace(before=arms.before @ twist_motion(twist.reshape(-1, 6)).reshape(arms.before.shape))
+
+
 def linkage_from(arms: Arms, centre: Float[np.ndarray, " joints"]) -> Linkage:
     """The first candidate as a linkage of the joint values themselves, where it was one of values less the centre."""
-    before, slides = arms.before[0].copy(), arms.slides[0]
+    arms = recentred(arms, -centre)
+    slides = arms.slides[0]
     gain = np.zeros((len(slides), len(centre)))
-    gain[np.arange(len(slides)), arms.motor] = arms.gain[0]
-    for axis, motion in enumerate(-(gain @ centre)):
-        before[axis] = before[axis] @ _z_motion(motion, bool(slides[axis]))
-    return Linkage(before, slides, gain, np.zeros(len(slides)), arms.tip[0])
-
-
-def _z_motion(motion: float, slides: bool) -> np.ndarray:
-    twist = np.zeros((1, 6))
-    twist[0, 2 if slides else 5] = motion
-    return twist_motion(twist)[0]
+    gain[np.arange(len(slides)), arms.motor[0]] = arms.gain[0]
+    return Linkage(arms.before[0], slides, gain, np.zeros(len(slides)), arms.tip[0])
 
 
 def resting(arms: Arms) -> Float[np.ndarray, "arms axes 4 4"]:
@@ -202,3 +208,12 @@ def lines_of(arms: Arms) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Directions of the axes, a point on each, and the tips, at zero motion in the base's frame."""
     frames = resting(arms)
     return frames[..., :3, 2], frames[..., :3, 3], (frames[:, -1] @ arms.tip)[:, :3, 3]
+
+
+def tidied(arms: Arms) -> Arms:
+    """The same arms with every axis' frame where its axis is nearest to the tip, all joints zero."""
+    along, through, tip = lines_of(arms)
+    ahead = ((tip[:, None] - through) * along).sum(axis=-1, keepdims=True)
+    tidy = from_lines(along, through + ahead * along, arms.slides, tip, arms.motor)._replace(gain=arms.gain)
+    end = resting(arms)[:, -1] @ arms.tip
+    return tidy._replace(tip=np.linalg.inv(resting(tidy)[:, -1]) @ end)

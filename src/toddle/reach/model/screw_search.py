@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Float
 
 from toddle.reach.model.screw_arms import Arms
+from toddle.reach.model.screw_isolation import Isolated, doubtful, isolated, isolated_arms
+from toddle.reach.model.screw_mimic import with_followers
+from toddle.reach.model.screw_plane import plane_arms
 from toddle.reach.model.screw_start import lack_of_fit, random_arms, robust_sigma
-from toddle.reach.model.screw_steps import Seen, descend, look
+from toddle.reach.model.screw_steps import NONE, Seen, descend, look
 from toddle.reach.model.screw_types import free_numbers, held_numbers, sliding, suspects
 
 _STARTS = 16
 _SUBSET = 150  # movements that starts are tried on
-_ROUNDS = 4
+_ROUNDS = 2
 _CLOSE = 0.012  # of the spread of the tips: an arm that misses by more is not taken while there are starts left
 _CHANCE = 4.0  # standard deviations of the test of fit
-_WILD = 4.6  # standard deviations [of each coordinate], of a miss: one in ten thousand of three coordinates
+_WILD = 4.6  # standard deviations of a coordinate: three coordinates miss by more once in ten thousand times
 _MOST_WILD = 0.15
+_UNIT = 0.1  # a gain that a few movements show nearer to 1 than this may be 1
 
 
 class Candidate(NamedTuple):
@@ -37,83 +42,126 @@ class Candidate(NamedTuple):
     fits: bool
 
 
-def search(
-    seen: Seen, motor: Int[np.ndarray, " axes"], slides: np.ndarray | None, rng: np.random.Generator
-) -> Candidate:
-    """An arm that explains the movements, or the best that was found."""
-    few = seen.some(rng.permutation(len(seen.q))[:_SUBSET])
-    axes = len(motor)
-    guess = np.zeros(axes) if slides is None else slides
-    fixed, loose = np.zeros(axes, bool), np.ones(axes, bool)
+class _Task(NamedTuple):
+    """What is searched with: all movements, some of them for the starts, and what is known of the joints."""
+
+    seen: Seen
+    few: Seen
+    slides: Float[np.ndarray, " joints"] | None
+    rng: np.random.Generator
+
+
+def search(seen: Seen, slides: Float[np.ndarray, " joints"] | None, rng: np.random.Generator) -> Candidate:
+    """An arm that explains the movements, or the best that was found.
+
+    Args:
+        seen: the movements.
+        slides: 1.0 where a joint slides; None: to be found out.
+        rng: for the starts.
+    """
+    task = _Task(seen, seen.some(rng.permutation(len(seen.q))[:_SUBSET]), slides, rng)
     best: Candidate | None = None
-    for _ in range(_ROUNDS):
-        best = _best(best, tried(random_arms(_STARTS, seen, guess, motor, rng), fixed, few, seen, rng))
+    for candidate in _proposals(task):
+        best = candidate if best is None else min(best, candidate, key=lambda one: (not one.fits, one.sigma))
         if best.fits:
-            return best
-        turning = tried(random_arms(_STARTS, seen, guess, motor, rng), loose, few, seen, rng)
-        best = _best(best, turning)
-        if slides is None:
-            for candidate in turning[:3]:
-                best = _best(best, with_slides(candidate, few, seen, rng))
-                if best.fits:
-                    break
-        if best.fits:
-            return best
+            break
     assert best is not None
     return best
 
 
-def with_slides(candidate: Candidate, few: Seen, seen: Seen, rng: np.random.Generator) -> list[Candidate]:
+def _proposals(task: _Task) -> Iterator[Candidate]:
+    """Ever more costly ideas of what the arm may be."""
+    joints = task.seen.q.shape[1]
+    shown = isolated(task.seen, task.slides, task.rng)
+    if shown is not None:
+        yield from _as_shown(shown, task)
+        if doubtful(shown.miss).any():
+            yield from _with_followers(shown, task)
+    for turn in range(_ROUNDS):
+        yield tried(_starts(task, gains=False), np.zeros(joints, bool), task)[0]
+        turning = tried(_starts(task, gains=True), np.ones(joints, bool), task)
+        yield turning[0]
+        if task.slides is None:
+            for candidate in turning[:3]:
+                yield from _with_slides(candidate, task)
+        if turn == 0 and (shown is None or not doubtful(shown.miss).any()):
+            yield from _with_followers(shown, task)
+
+
+def _starts(task: _Task, *, gains: bool) -> Arms:
+    joints = task.seen.q.shape[1]
+    slides = np.zeros(joints) if task.slides is None else task.slides
+    if task.seen.rows == 2 and not slides.any():
+        return plane_arms(2, task.few, np.arange(joints), task.rng, gains=gains)
+    return random_arms(_STARTS, task.seen, slides, np.arange(joints), task.rng)
+
+
+def _as_shown(shown: Isolated, task: _Task) -> Iterator[Candidate]:
+    """From the axes that movements of single joints showed."""
+    joints = len(shown.gain)
+    count = 8 if doubtful(shown.miss).any() else 1
+    unit = np.abs(np.abs(shown.gain) - 1) < _UNIT
+    if unit.all():
+        rounded = shown._replace(gain=np.sign(shown.gain))
+        yield tried(isolated_arms(rounded, count, task.seen, task.rng), np.zeros(joints, bool), task)[0]
+    yield tried(isolated_arms(shown, count, task.seen, task.rng), np.ones(joints, bool), task)[0]
+
+
+def _with_slides(candidate: Candidate, task: _Task) -> Iterator[Candidate]:
     """The same arm with its suspects put as sliding, all together and one by one, with gains free and not."""
-    doubtful = suspects(candidate.arms, np.ptp(seen.q, axis=0))[0]
-    if not doubtful.any():
-        return []
-    choices = [doubtful, *(np.eye(len(doubtful), dtype=bool)[doubtful] if doubtful.sum() > 1 else [])]
-    found: list[Candidate] = []
-    for choice in choices:
+    suspected = suspects(candidate.arms, np.ptp(task.seen.q, axis=0))[0]
+    if not suspected.any():
+        return
+    for choice in [suspected, *(np.eye(len(suspected), dtype=bool)[suspected] if suspected.sum() > 1 else [])]:
         arms = sliding(candidate.arms, choice)
-        found += tried(arms._replace(gain=np.ones(arms.gain.shape)), ~np.ones(len(choice), bool), few, seen, rng)
-        found += tried(arms, np.ones(len(choice), bool), few, seen, rng)
-    return sorted(found, key=lambda one: one.sigma)
+        yield tried(arms._replace(gain=np.ones(arms.gain.shape)), np.zeros(len(choice), bool), task)[0]
+        yield tried(arms, np.ones(len(choice), bool), task)[0]
 
 
-def tried(
-    arms: Arms, gains: Bool[np.ndarray, " axes"], few: Seen, seen: Seen, rng: np.random.Generator
-) -> list[Candidate]:
+def _with_followers(shown: Isolated | None, task: _Task) -> Iterator[Candidate]:
+    """With one more axis, driven by a motor that drives another already."""
+    for gains in (False, True):
+        arms, extra = with_followers(shown, task.few, task.slides, task.rng, gains=gains)
+        loose = np.ones(arms.slides.shape, bool) if gains else extra
+        yield tried(arms, loose, task)[0]
+
+
+def tried(arms: Arms, gains: Bool[np.ndarray, "*arms axes"], task: _Task) -> list[Candidate]:
     """What becomes of some starts, the best first: by least squares, then with wild movements counting less."""
-    free = free_numbers(len(gains), seen.rows, gains=bool(gains.any()))
-    held = held_numbers(arms, free, seen.rows, gains)
-    arms = descend(arms, few, free, steps=60, held=held)[0]
-    found = judged(arms, gains, seen, rng)
+    gains = np.broadcast_to(gains, arms.slides.shape)
+    free = free_numbers(gains.shape[1], task.seen.rows, gains=bool(gains.any()))
+    held = held_numbers(arms, free, task.seen.rows, gains)
+    arms = descend(arms, task.few, free, steps=60, held=held)[0]
+    found = judged(arms, gains, task)
     if found[0].fits:
         return found
-    floor = 1e-12 * seen.x.std()
-    square = look(arms, few, free).square
+    floor = 1e-12 * task.seen.x.std()
+    square = look(arms, task.few, free).square
     for _ in range(5):
-        scale = 5 * robust_sigma(square, seen.rows) + floor
-        arms, _, square = descend(arms, few, free, steps=8, held=held, scale=scale)
-    return judged(arms, gains, seen, rng)
+        scale = 5 * robust_sigma(square, task.seen.rows) + floor
+        arms, _, square = descend(arms, task.few, free, steps=8, held=held, scale=scale)
+    return judged(arms, gains, task)
 
 
-def judged(arms: Arms, gains: Bool[np.ndarray, " axes"], seen: Seen, rng: np.random.Generator) -> list[Candidate]:
-    """How well some arms explain all movements, the best first."""
-    state = look(arms, seen, np.zeros(0, int))
-    sigma = robust_sigma(state.square, seen.rows)
+def judged(arms: Arms, gains: Bool[np.ndarray, "arms axes"], task: _Task) -> list[Candidate]:
+    """How well some arms explain all movements, the best first; only the two best may be said to fit."""
+    seen = task.seen
+    square = look(arms, seen, NONE)
+    sigma = robust_sigma(square.square, seen.rows)
     order = np.argsort(sigma)
     found = []
-    for which in order:
-        fits = False
-        if len(found) < 2 and sigma[which] < _CLOSE * seen.x.std():
-            tame = state.square[which] < (_WILD * sigma[which]) ** 2 + 1e-24 * seen.x.var()
-            fits = tame.mean() > 1 - _MOST_WILD and (
-                sigma[which] < 1e-9 * seen.x.std()
-                or lack_of_fit(state.miss[which][:, tame], seen.q[tame], rng) < _CHANCE
-            )
-        found.append(Candidate(arms.pick(which), gains, float(sigma[which]), fits))
+    for rank, which in enumerate(order):
+        fits = rank < 2 and explains(square.miss[which], seen, float(sigma[which]), task.rng)
+        found.append(Candidate(arms.pick(which), gains[which], float(sigma[which]), fits))
     return found
 
 
-def _best(best: Candidate | None, found: list[Candidate]) -> Candidate:
-    """The better of what there was and what was found; one that fits before any that does not."""
-    every = [*found, *([] if best is None else [best])]
-    return min(every, key=lambda one: (not one.fits, one.sigma))
+def explains(miss: Float[np.ndarray, "rows movements"], seen: Seen, sigma: float, rng: np.random.Generator) -> bool:
+    """Whether misses are small, few of them wild, and the joints don't foretell them."""
+    spread = float(seen.x.std())
+    if sigma < 1e-9 * spread:
+        return True
+    if sigma > _CLOSE * spread:
+        return False
+    tame = (miss**2).sum(axis=0) < (_WILD * sigma) ** 2
+    return bool(tame.mean() > 1 - _MOST_WILD) and lack_of_fit(miss[:, tame], seen.q[tame], rng) < _CHANCE

@@ -26,7 +26,8 @@ def random_arms(
     if seen.rows == 2:
         along[..., :2] = 0.0
         through[..., 2] = tip[..., 2] = 0.0
-    return from_lines(along, middle + spread * through, np.tile(slides, (count, 1)), middle + spread * tip, motor)
+    kinds, motors = np.tile(slides, (count, 1)), np.tile(motor, (count, 1))
+    return from_lines(along, middle + spread * through, kinds, middle + spread * tip, motors)
 
 
 def robust_sigma(square: Float[np.ndarray, "*arms movements"], rows: int) -> Float[np.ndarray, "*arms"]:

@@ -15,6 +15,9 @@ from jaxtyping import Float
 from toddle.reach.model.rigid import PER_AXIS
 from toddle.reach.model.screw_arms import Arms, move, stepped
 
+NONE = np.zeros(0, int)
+"""No free numbers: the misses alone."""
+
 _LARGEST_TURN = 1.0  # [rad] a step
 
 
@@ -171,6 +174,6 @@ def _chosen(better: np.ndarray, new: State, old: State) -> State:
         pick(new.arms.slides, old.arms.slides),
         pick(new.arms.gain, old.arms.gain),
         pick(new.arms.tip, old.arms.tip),
-        old.arms.motor,
+        pick(new.arms.motor, old.arms.motor),
     )
     return State(arms, pick(new.miss, old.miss), pick(new.slope, old.slope))

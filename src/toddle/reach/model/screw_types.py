@@ -15,11 +15,13 @@ from toddle.reach.model.screw_arms import Arms, from_lines, lines_of
 _SMALL_TURN = 0.35  # [rad] over a joint's whole range: it may as well slide
 
 
-def free_numbers(axes: int, rows: int, *, gains: bool) -> Int[np.ndarray, " free"]:
-    """The numbers that a fit may change: axes across themselves, their stretch where asked for, the tip's place."""
+def free_numbers(axes: int, rows: int, *, gains: bool, turns: bool = False) -> Int[np.ndarray, " free"]:
+    """The numbers that a fit may change: axes across themselves, their stretch where asked for, the tip."""
     kinds = [0, 1, 4] if rows == 2 else [0, 1, 3, 4]
     per_axis = PER_AXIS * np.arange(axes)[:, None] + np.array([*kinds, *([6] if gains else [])])
-    return np.concatenate([per_axis.ravel(), PER_AXIS * axes + np.arange(rows)])
+    return np.concatenate(
+        [per_axis.ravel(), PER_AXIS * axes + np.arange(rows), PER_AXIS * axes + np.arange(3, 6 if turns else 3)]
+    )
 
 
 def held_numbers(

@@ -8,86 +8,61 @@ All is found by Levenberg-Marquardt from several starts (`screw_search`, `screw_
 from __future__ import annotations
 
 import time
-from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool
 
 from toddle.reach.model.model import Fit
-from toddle.reach.model.rigid import Rigid, number_slopes
-from toddle.reach.model.screw_arms import Arms, linkage_from
-from toddle.reach.model.screw_search import Candidate, search
-from toddle.reach.model.screw_start import robust_sigma
-from toddle.reach.model.screw_steps import Seen, descend, look
-from toddle.reach.model.screw_types import free_numbers, held_numbers
-from toddle.robots.linkage import Linkage
+from toddle.reach.model.rigid import Rigid
+from toddle.reach.model.screw_arms import linkage_from, tidied
+from toddle.reach.model.screw_check import checked, refuse_unmoved
+from toddle.reach.model.screw_final import covariance, finished
+from toddle.reach.model.screw_notes import notes_of
+from toddle.reach.model.screw_search import search
+from toddle.reach.model.screw_steps import NONE, Seen, look
+from toddle.reach.model.screw_turn import with_turns
 from toddle.signals import Experience
 
 
 def fit_screws(
     experience: Experience, *, joints: tuple[str, ...], slides: Bool[np.ndarray, " joints"] | None = None, seed: int = 0
 ) -> Fit:
-    """Learn a rigid arm."""
+    """Learn a rigid arm from movements that it made.
+
+    Random movements do; some that move one joint at a time (`toddle.reach.explore.isolating`) make it quicker and find
+    harder arms. The accuracy to expect is ``noise * sqrt(P / movements)`` with P numbers, about 4 a joint and 3.
+
+    Args:
+        experience: the movements; with two coordinates of the tip, all joints turn about z or slide in the plane.
+        joints: the joints' names, in the order of the chain and of the columns of q.
+        slides: which joints slide; None: that is found out.
+        seed: for the starts.
+
+    Returns:
+        The fit, its model a `toddle.reach.model.rigid.Rigid`. Where no structure explains the movements it is the best
+        that was found, and its miss shows that.
+
+    Raises:
+        BadInput: there are too few movements, a joint stays or always moves with another, or the tip doesn't move.
+    """
     began = time.perf_counter()
+    good, whole = checked(experience, joints)
     rng = np.random.default_rng(seed)
-    centre = experience.q.mean(axis=0)
-    x = np.zeros((len(experience.x), 3))
-    x[:, : experience.x.shape[1]] = experience.x
-    seen = Seen(experience.q - centre, x, rows=experience.x.shape[1])
-    found = search(seen, np.arange(len(joints)), None if slides is None else slides.astype(float), rng)
-    final = polished(found, seen)
-    linkage = linkage_from(final.arms, centre)
-    coordinates = tuple(range(seen.rows))
-    covariance = _covariance(linkage, experience.q, coordinates, final)
-    model = Rigid(linkage, covariance, coordinates)
-    miss = np.linalg.norm(experience.x - model.forward(experience.q), axis=1)
-    return Fit(model, "screws", miss, final.sigma, final.wild, time.perf_counter() - began, ())
-
-
-class Polished(NamedTuple):
-    """An arm fitted to all tame movements."""
-
-    arms: Arms
-    free: np.ndarray
-    wild: np.ndarray
-    sigma: float
-
-
-def polished(found: Candidate, seen: Seen) -> Polished:
-    """The arm fitted to all tame movements by least squares."""
-    rows, arms = seen.rows, found.arms
-    axes = len(found.gains)
-
-    def fitted(arms: Arms, gains: np.ndarray, seen: Seen, scale: float = np.inf):
-        free = free_numbers(axes, rows, gains=True)
-        held = held_numbers(arms, free, rows, gains)
-        arms, cost, square = descend(arms, seen, free, steps=40, held=held, scale=scale, tolerance=1e-9)
-        return arms, cost[0], square[0], free[~held[0]]
-
-    square = look(arms, seen, np.zeros(0, int)).square
-    for _ in range(2):
-        scale = 5 * float(robust_sigma(square, rows)[0]) + 1e-12 * seen.x.std()
-        arms, _, square, _ = fitted(arms, found.gains, seen, scale)
-        square = square[None]
-    wild = np.zeros(len(seen.q), bool)
-    gains = found.gains
-    for _ in range(3):
-        tame = seen.some(~wild)
-        arms, cost, square, free = fitted(arms, gains, tame)
-        sigma = np.sqrt(cost / max(rows * (~wild).sum() - len(free), 1))
-        square = look(arms, seen, np.zeros(0, int)).square[0]
-        new = square > (4.6 * sigma) ** 2 + 1e-20 * seen.x.var()
-        if (new == wild).all():
-            break
-        wild = new
-    return Polished(arms, free, wild, float(sigma))
-
-
-def _covariance(
-    linkage: Linkage, q: Float[np.ndarray, "movements joints"], coordinates: tuple[int, ...], final: Polished
-) -> Float[np.ndarray, "numbers numbers"]:
-    slope = number_slopes(linkage, q[~final.wild])[1][:, coordinates]
-    slope = slope.reshape(-1, slope.shape[2])[:, final.free]
-    covariance = np.zeros((7 * len(linkage.slides) + 6,) * 2)
-    covariance[np.ix_(final.free, final.free)] = final.sigma**2 * np.linalg.pinv(slope.T @ slope, rcond=1e-10)
-    return covariance
+    centre = good.q.mean(axis=0)
+    rows = good.x.shape[1]
+    x = np.pad(good.x.astype(float), ((0, 0), (0, 3 - rows)))
+    seen = Seen(good.q - centre, x, None if rows == 2 else good.turn, rows)
+    found = search(seen._replace(turn=None), None if slides is None else slides.astype(float), rng)
+    final = finished(found.arms, found.gains, seen._replace(turn=None))
+    if not found.fits:
+        refuse_unmoved(good, np.linalg.norm(look(final.arms, seen._replace(turn=None), NONE).miss[0], axis=0), rng)
+    if seen.turn is not None:
+        arms, seen = with_turns(final.arms, final.gains, seen, final.sigma, rng)
+        final = finished(arms, final.gains, seen)
+    linkage = linkage_from(tidied(final.arms), centre)
+    model = Rigid(linkage, covariance(linkage, final, good.q, rows, seen.lever), tuple(range(rows)))
+    miss, wild = np.full(len(whole), np.nan), ~whole
+    miss[whole] = np.linalg.norm(good.x - model.forward(good.q), axis=1)
+    wild[whole] = final.wild
+    notes = notes_of(final, joints, found.fits, seen, whole)
+    return Fit(model, "screws", miss, final.sigma, wild, time.perf_counter() - began, notes)

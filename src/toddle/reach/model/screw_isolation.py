@@ -1,0 +1,130 @@
+"""Where the axes lie, from movements in which one joint moved and the others stayed.
+
+Each such joint alone is an arm of one axis, and its fit is easy: a circle, with known angles, or almost a line, with a
+gain that is then small. What misses by much more than the other joints' has a wild movement in it, or more axes.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from toddle.reach.model.screw_arms import Arms, from_lines, lines_of, recentred
+from toddle.reach.model.screw_start import random_arms
+from toddle.reach.model.screw_steps import Seen, descend
+from toddle.reach.model.screw_types import free_numbers, held_numbers, sliding, suspects
+
+_STARTS = 6
+_FEWEST = 2  # movements of a joint, besides where all stay
+
+
+class Isolated(NamedTuple):
+    """Axes as they lie where the joints stay.
+
+    Attributes:
+        along: their directions.
+        through: a point on each [m].
+        slides: 1.0 where an axis slides.
+        gain: motion of each axis for a unit of its joint.
+        miss: root mean square of each coordinate's miss, joint by joint, for the numbers that were spent [m].
+        tip: where the tip is [m].
+        posture: where the joints stay, less the centre [rad or m].
+    """
+
+    along: Float[np.ndarray, "joints 3"]
+    through: Float[np.ndarray, "joints 3"]
+    slides: Float[np.ndarray, " joints"]
+    gain: Float[np.ndarray, " joints"]
+    miss: Float[np.ndarray, " joints"]
+    tip: Float[np.ndarray, "3"]
+    posture: Float[np.ndarray, " joints"]
+
+
+def alone(q: Float[np.ndarray, "movements joints"]) -> tuple[int, Int[np.ndarray, " movements"]] | None:
+    """A movement from which others differ by one joint at most, and which joint: -1 none, -2 several.
+
+    Returns:
+        None where some joint has not moved alone at least twice.
+    """
+    span = np.ptp(q, axis=0)
+    best: tuple[int, Int[np.ndarray, " movements"]] | None = None
+    for row in range(min(len(q), 400)):
+        moved = np.abs(q - q[row]) > 2e-3 * span
+        count = moved.sum(axis=1)
+        if best is None or (count <= 1).sum() > (best[1] > -2).sum():
+            best = row, np.where(count == 1, moved.argmax(axis=1), np.where(count == 0, -1, -2))
+    if best is None or min(np.count_nonzero(best[1] == joint) for joint in range(q.shape[1])) < _FEWEST:
+        return None
+    return best
+
+
+def isolated(seen: Seen, slides: Float[np.ndarray, " joints"] | None, rng: np.random.Generator) -> Isolated | None:
+    """The axes as the movements of single joints show them; None where there are no such movements.
+
+    Args:
+        seen: the movements.
+        slides: 1.0 where a joint slides; None: to be found out.
+        rng: for starts.
+    """
+    found = alone(seen.q)
+    if found is None:
+        return None
+    row, joint_of = found
+    joints = seen.q.shape[1]
+    posture = seen.q[row]
+    tip = np.median(seen.x[joint_of == -1], axis=0)
+    known = np.full(joints, np.nan) if slides is None else slides
+    lines = [_axis(seen, posture, joint_of, joint, float(known[joint]), rng) for joint in range(joints)]
+    along, through, slides, gain, miss = (np.array(values) for values in zip(*lines, strict=True))
+    return Isolated(along, through, slides, gain, miss, tip, posture)
+
+
+def isolated_arms(found: Isolated, count: int, seen: Seen, rng: np.random.Generator) -> Arms:
+    """Starts from the axes that were found; all but the first with those that miss by much drawn at random."""
+    joints = len(found.gain)
+    motor = np.tile(np.arange(joints), (count, 1))
+    drawn = lines_of(random_arms(count, seen, found.slides, motor[0], rng))
+    redrawn = doubtful(found.miss) & (np.arange(count) > 0)[:, None]
+    along = np.where(redrawn[..., None], drawn[0], found.along)
+    through = np.where(redrawn[..., None], drawn[1], found.through)
+    slides = np.where(redrawn, 0.0, found.slides)
+    arms = from_lines(along, through, slides, np.tile(found.tip, (count, 1)), motor)
+    return recentred(arms._replace(gain=np.where(redrawn, 1.0, found.gain)), -found.posture)
+
+
+def doubtful(miss: Float[np.ndarray, " joints"]) -> Bool[np.ndarray, " joints"]:
+    """Joints whose own movements are explained much worse than the others'."""
+    return miss > 5 * np.median(miss) + 1e-9
+
+
+def _axis(
+    seen: Seen, posture: np.ndarray, joint_of: np.ndarray, joint: int, slides: float, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray, float, float, float]:
+    """Direction, point, whether it slides, gain and miss of one joint's axis."""
+    rows = np.flatnonzero((joint_of == joint) | (joint_of == -1))
+    own = seen._replace(q=seen.q[rows][:, [joint]] - posture[joint], x=seen.x[rows], turn=None)
+    best, least = None, np.inf
+    for loose in (False, True):
+        arms = random_arms(_STARTS, own, np.array([float(slides > 0)]), np.zeros(1, int), rng)
+        free = free_numbers(1, seen.rows, gains=loose)
+        cost, arms = _fitted(arms, own, free, np.array([loose]))
+        arms = arms.pick(int(cost.argmin()))
+        if loose and np.isnan(slides):
+            slid = sliding(arms, suspects(arms, np.ptp(own.q, axis=0)))
+            more, slid = _fitted(slid, own, free, np.array([True]))
+            arms, cost = (slid, more) if more[0] < 1.5 * cost.min() + 1e-24 else (arms, cost)
+        spare = max(seen.rows * len(rows) - len(free), 1)
+        miss = float(np.sqrt(cost.min() / spare))
+        if miss < 0.7 * least:
+            best, least = arms, miss
+    assert best is not None
+    along, through, _ = lines_of(best)
+    return along[0, 0], through[0, 0], float(best.slides[0, 0]), float(best.gain[0, 0]), least
+
+
+def _fitted(arms: Arms, seen: Seen, free: np.ndarray, gains: np.ndarray) -> tuple[np.ndarray, Arms]:
+    held = held_numbers(arms, free, seen.rows, gains)
+    arms, cost, _ = descend(arms, seen, free, steps=40, held=held)
+    return cost, arms
