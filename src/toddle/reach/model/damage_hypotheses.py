@@ -3,8 +3,9 @@
 A hypothesis has a few numbers ``theta = mean + root z`` with z standard normal before anything is seen. In the family
 of joints, joint j goes to ``theta_0 + theta_1 q_j``: a slip (theta_1 = 1), a lock (0) or a weaker joint (between). In
 the family of links, the frame at the far end of a link is moved by the twist theta (shift [m], turn [rad]) in its own
-axes: a bend, or along the link alone, a link of another length. A frame's motion leaves what comes before and after
-untouched, so a link's hypothesis needs no kinematics: the tip is ``F B c`` with F and c known.
+axes: a bend, or without the turn, a link of another length (as a shift without a turn it is the same wherever on the
+axes a learned arm has its frames). What comes before and after is untouched, so that a link's hypothesis needs no
+kinematics: the tip is ``F B c`` with F and c known.
 """
 
 from __future__ import annotations
@@ -20,7 +21,6 @@ from toddle.robots.linkage import Linkage, axis_frames, pose_slopes
 
 _SLIP, _LOCK_PLACE, _REMAINS = 0.3, 0.1, 0.3  # [rad] a slip; how far from where it stood a joint locks; share
 _SHIFT, _TURN, _LENGTH = 0.1, 0.3, 0.1  # [m], [rad] of a bend, [m] of a replaced link
-_POINT = 1e-3  # [m] a link shorter than that has no length to change
 
 Predict = Callable[
     [Float[np.ndarray, "cases numbers"]],
@@ -87,23 +87,21 @@ def joint_family(
         slope = slope.reshape(len(numbers), -1, 6, count)[cases, :, :, joints]
         return pose.reshape(*told.shape[:2], 4, 4), np.stack([slope, slope * asked[..., None]], axis=3)
 
-    starts = np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [2.0, 0.0], [-2.0, 0.0]])
+    places = (0.0, 2.0, -2.0) if stood is not None else (0.0, 1.0, -1.0, 2.0, -2.0)
+    starts = np.array([[place, 0.0] for place in places])
     kinds = ("slip",) * count + ("lock",) * count + ("weaken",) * count
     return Family(kinds, tuple(joints.tolist()), mean.reshape(-1, 2), root.reshape(-1, 2, 2), starts, predict)
 
 
 def link_family(linkage: Linkage, q: Float[np.ndarray, "movements joints"]) -> Family:
-    """Bends, one after each axis, and links of another length, where they have one."""
+    """Bends and links of another length, one of each after each axis."""
     axes = len(linkage.slides)
     far = np.concatenate([linkage.before[1:], linkage.tip[None]])
     frames = axis_frames(linkage, q) @ far[:, None]  # the far end of each link, before the next axis moves it
-    length = np.linalg.norm(far[:, :3, 3], axis=1)
-    long = np.flatnonzero(length > _POINT)
-    root = np.zeros((axes + len(long), 6, 6))
-    root[:axes] = np.diag([_SHIFT] * 3 + [_TURN] * 3)
-    along = far[long, :3, 3] / length[long, None]
-    root[axes:, :3, 0] = _LENGTH * np.einsum("aij,ai->aj", far[long, :3, :3], along)
-    which = np.concatenate([np.arange(axes), long])
+    root = np.zeros((2, axes, 6, 6))
+    root[0] = np.diag([_SHIFT] * 3 + [_TURN] * 3)
+    root[1] = np.diag([_LENGTH] * 3 + [0.0] * 3)
+    which = np.tile(np.arange(axes), 2)
     beyond = np.linalg.inv(frames) @ frames[-1]  # from there to the tip
 
     def predict(
@@ -119,8 +117,10 @@ def link_family(linkage: Linkage, q: Float[np.ndarray, "movements joints"]) -> F
         slope[..., :3, 3:] = -turn @ _cross(arm) @ turn_slope(numbers[:, 3:])[:, None]
         return tip, slope
 
-    kinds = ("bend",) * axes + ("replace",) * len(long)
-    return Family(kinds, tuple(which.tolist()), np.zeros((len(which), 6)), root, np.zeros((1, 6)), predict)
+    kinds = ("bend",) * axes + ("replace",) * axes
+    return Family(
+        kinds, tuple(which.tolist()), np.zeros((2 * axes, 6)), root.reshape(-1, 6, 6), np.zeros((1, 6)), predict
+    )
 
 
 def turn_slope(turn: Float[np.ndarray, "cases 3"]) -> Float[np.ndarray, "cases 3 3"]:

@@ -6,24 +6,31 @@ the model's own doubt explain, the numbers z in units of what was to be expected
 
     log p = -1/2 (r'r + z'z + log det(I + J'J)).
 
-A bend may explain whatever a slip explains, with five numbers more; the determinant is what it pays for them.
+A bend may explain whatever a slip explains, with five numbers more; the determinant is what it pays for them. A single
+wild look among the movements is found by leaving each out in turn.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.spatial.transform import Rotation
 
 from toddle.reach.model.damage_hypotheses import Family, joint_family, link_family, turn_slope
+from toddle.reach.model.damage_watch import JUMP, surprises
 from toddle.reach.model.rigid import PER_AXIS, Rigid, changed
 from toddle.robots.linkage import Linkage
 from toddle.signals import Experience
 
 _ROUNDS = 25
-_KEPT = 1e-3  # hypotheses that are less likely than that are forgotten when movements are chosen
+_KEPT = 1e-3  # hypotheses that are less likely than that are forgotten
+_FEW = 3  # movements, of which one can be told to be wild
+_WILD = 25.0  # log evidence that a wild look must cost: it may be one in a thousand, and anywhere in some cubic metres
 
 
 @dataclass(frozen=True)
@@ -33,8 +40,8 @@ class Repair:
     Attributes:
         kind: "slip", "lock", "weaken", "bend", "replace", or "nothing".
         joint: the joint that broke, or whose link did, counted from 0 at the base; -1: none.
-        amount: the slip [rad or m], where it is locked [rad or m], what remains of its motion, how far the far end of
-            the link is from where it was [m], or how much longer the link is [m].
+        amount: the slip [rad or m], where it is locked [rad or m], what remains of its motion, or how far the far end
+            of the link (where the next axis has its frame) is from where it was [m].
         sureness: probability of this cause among all that were weighed.
         model: the arm as it is now.
         free: joints that still move; a solver must not use the others.
@@ -69,26 +76,30 @@ def repair(
         stood: where the joints stood just before [rad or m]: that is where a joint locks; None: not known.
         angle_sensor: standard deviation of a seen orientation about each axis [rad].
     """
-    seen = _Seen.of(model, since, sensor, angle_sensor)
-    evidences, makers = [_nothing(model, seen, since)], [lambda: (model, 0.0)]
-    causes = [("nothing", -1)]
-    for family in (joint_family(model.linkage, since.q, lower, upper, stood), link_family(model.linkage, since.q)):
-        numbers, evidence, covariance = _fitted(family, seen)
-        for case, (kind, axis) in enumerate(zip(family.kinds, family.axes, strict=True)):
-            joint = axis if family.mean.shape[1] == 2 else int(np.argmax(np.abs(model.linkage.gain[axis])))
-            causes.append((kind, joint))
-            evidences.append(float(evidence[case]))
-            make = _joint_changed if family.mean.shape[1] == 2 else _link_changed
-            makers.append(lambda m=make, k=kind, a=axis, n=numbers[case], c=covariance[case]: m(model, k, a, n, c))
-    weight = np.exp(np.array(evidences) - max(evidences))
+
+    def weighed(kept: np.ndarray) -> list[_Cause]:
+        some = Experience(since.q[kept], since.x[kept], None if since.turn is None else since.turn[kept])
+        return _weighed(model, some, _Seen.of(model, some, sensor, angle_sensor), (lower, upper, stood))
+
+    kept = np.arange(len(since.q))
+    causes = weighed(kept)
+    while len(kept) >= _FEW:  # does one wild look stand against all others?
+        now = causes[0].make()[0]
+        if surprises(now, since.q[kept], since.x[kept], sensor).max() < JUMP:
+            break
+        trials = [weighed(np.delete(kept, row)) for row in range(len(kept))]
+        row = int(np.argmax([trial[0].evidence for trial in trials]))
+        if trials[row][0].evidence - causes[0].evidence < _WILD:
+            break
+        kept, causes = np.delete(kept, row), trials[row]
+    weight = np.exp([cause.evidence - causes[0].evidence for cause in causes])
     weight /= weight.sum()
     repairs = []
-    for k in np.argsort(-weight):
-        if repairs and weight[k] < _KEPT:
-            break
-        (kind, joint), (now, amount) = causes[k], makers[k]()
-        free = np.array([not (kind == "lock" and j == joint) for j in range(since.q.shape[1])])
-        repairs.append(Repair(kind, joint, amount, float(weight[k]), now, free))
+    for cause, sureness in zip(causes, weight, strict=True):
+        if sureness >= _KEPT:
+            now, amount = cause.make()
+            free = np.array([not (cause.kind == "lock" and j == cause.joint) for j in range(since.q.shape[1])])
+            repairs.append(Repair(cause.kind, cause.joint, amount, float(sureness), now, free))
     return tuple(repairs)
 
 
@@ -141,9 +152,32 @@ class _Seen:
         return np.einsum("mij,cmjk->cmik", self.white, slope[:, :, self.rows]).reshape(len(slope), -1, slope.shape[3])
 
 
-def _nothing(model: Rigid, seen: _Seen, since: Experience) -> float:
-    """Evidence of an arm that is as it was."""
-    return -0.5 * float((seen.miss(model.pose(since.q)[None]) ** 2).sum())
+class _Cause(NamedTuple):
+    """A hypothesis, fitted."""
+
+    kind: str
+    joint: int
+    evidence: float
+    make: Callable[[], tuple[Rigid, float]]
+
+
+def _weighed(
+    model: Rigid, since: Experience, seen: _Seen, joints: tuple[np.ndarray, np.ndarray, np.ndarray | None]
+) -> list[_Cause]:
+    """Every hypothesis fitted to the movements, the likeliest first."""
+    miss = seen.miss(model.pose(since.q)[None])
+    causes = [_Cause("nothing", -1, -0.5 * float((miss**2).sum()), lambda: (model, 0.0))]
+    joint_of = np.argmax(np.abs(model.linkage.gain), axis=1)
+    for family, change in (
+        (joint_family(model.linkage, since.q, *joints), _joint_changed),
+        (link_family(model.linkage, since.q), _link_changed),
+    ):
+        numbers, evidence, covariance = _fitted(family, seen)
+        for case, (kind, axis) in enumerate(zip(family.kinds, family.axes, strict=True)):
+            make = partial(change, model, kind, axis, numbers[case], covariance[case])
+            joint = axis if change is _joint_changed else int(joint_of[axis])
+            causes.append(_Cause(kind, joint, float(evidence[case]), make))
+    return sorted(causes, key=lambda cause: -cause.evidence)
 
 
 def _fitted(
@@ -234,8 +268,4 @@ def _link_changed(
     into[3:, 3:] = turn_slope(numbers[None, 3:])[0].T
     doubt = model.covariance.copy()
     doubt[first : first + 6, first : first + 6] += into @ covariance @ into.T
-    amount = float(np.linalg.norm(numbers[:3]))
-    if kind == "replace":
-        link = model.linkage.before[axis + 1] if axis + 1 < len(model.linkage.before) else model.linkage.tip
-        amount *= float(np.sign(link[:3, 3] @ link[:3, :3] @ numbers[:3]))
-    return replace(model, linkage=linkage, covariance=doubt), amount
+    return replace(model, linkage=linkage, covariance=doubt), float(np.linalg.norm(numbers[:3]))
