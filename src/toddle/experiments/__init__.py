@@ -22,6 +22,10 @@ NAMES = (
     "mahboob-suralp",
     "mahboob-planar5",
     "rolf-direction-sampling",
+    "thuruthel-network-size",
+    "thuruthel-points",
+    "thuruthel-circle",
+    "thuruthel-locked",
 )
 """The only place to edit to add one: its file has the same name, with underscores, and defines ``EXPERIMENT``."""
 

@@ -109,18 +109,23 @@ class IteratedInverse:
                 break
         return Settled(q, steps, np.stack(ways))
 
-    def follow(self, path: Positions, act: Act, start: Float[np.ndarray, " joints"] | None = None) -> Positions:
+    def follow(
+        self, path: Positions, act: Act, start: Float[np.ndarray, " joints"] | None = None, *, feedback: float = 0.0
+    ) -> Positions:
         """Where the tip goes when each point of a path is a target for one step [m].
 
         Args:
             path: the points in their order [m].
             act: moves the arm, one posture at a time.
             start: joint values to begin at [rad or m]; None: home.
+            feedback: the share of what was missed at a point by which all later ones are shifted; the paper's method
+                doesn't look at what it missed (0).
         """
         self._check(path, None)
-        q, way = (self.home if start is None else start)[None], []
+        q, shift, way = (self.home if start is None else start)[None], np.zeros(path.shape[1]), []
         for point in path:
-            q, x = act(self.step(point[None], q))
+            q, x = act(self.step((point + shift)[None], q))
+            shift = shift + feedback * (point - x[0])
             way.append(x[0])
         return np.array(way)
 
