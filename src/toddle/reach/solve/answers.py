@@ -24,3 +24,19 @@ class Answers(NamedTuple):
     angle: Float[np.ndarray, " batch"]
     solved: Bool[np.ndarray, " batch"]
     held: Bool[np.ndarray, "batch joints"]
+
+
+class Answer(NamedTuple):
+    """An answer for one target, within the joint limits; see `Answers`.
+
+    Attributes:
+        q: joint values [rad or m].
+        distance: from the target to where the model puts the tip [m].
+        angle: between the orientation asked for and the modelled one [rad]; 0 where none was asked for.
+        solved: whether both are within the solver's tolerance.
+    """
+
+    q: Float[np.ndarray, " joints"]
+    distance: float
+    angle: float
+    solved: bool
