@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from toddle.signals import Experience
 
 MOVEMENTS = "movements"
+FORMATS = (".onnx", ".jax")
 _SAVE_SECONDS = 5.0
 _CHUNK = 20  # movements between two looks at the clock, on a plant
 
@@ -34,6 +35,7 @@ def learn(asked: Reach) -> int:
     from toddle.reach.body_run import plan
     from toddle.reach.structures import structure_named
     from toddle.robots.catalogue import Choice, load_choice, settled
+    from toddle.robots.chain import Chain
 
     begun = time.perf_counter()
     config = _config(asked)
@@ -41,14 +43,14 @@ def learn(asked: Reach) -> int:
         structure_named(config.method)
     source = settled(Choice(asked.robot or "", asked.tip, asked.base, asked.joints))
     refuse_used(asked.out)
-    for path in (*(asked.to or ()), *([asked.to_urdf] if asked.to_urdf else [])):
-        refuse_file(path)
+    refuse_files(asked)
     body = load_choice(source)
+    if asked.to_urdf is not None and not isinstance(body, Chain):
+        raise BadInput(f"{source.spec} has no rigid links", where="--to-urdf", remedy="leave it out")
     how = {"plant": asked.plant or "kinematics", "noise": config.noise if asked.plant == "physics" else None}
     robot = mover(body, how, config.seed)
     work = work_of(asked, body, how["plant"], len(plan(robot, config, like=body).q))
-    folder = new_folder(asked.out, source.spec)
-    return _run(asked, robot, body, config, source, how, folder, begun, work=work)
+    return _run(asked, robot, body, config, source, how, asked.out, begun, work=work)
 
 
 def resume(asked: Reach, folder: Path) -> int:
@@ -111,12 +113,16 @@ def work_of(asked: Reach, body: Body, plant: str, movements: int) -> Work | None
     return work_plan(asked.damage, body, movements, body.carriers if isinstance(body, Chain) else {})
 
 
-def refuse_file(path: Path) -> None:
-    """Refuse to write over a file, or into a folder that isn't there."""
-    if path.exists():
-        raise BadInput("it is there already", where=str(path), remedy="name another file")
-    if not path.parent.is_dir():
-        raise BadInput("its folder is not there", where=str(path), remedy="make it, or name another")
+def refuse_files(asked: Reach) -> None:
+    """Refuse to write over a file, into a folder that isn't there, or in a format that there isn't."""
+    for path in asked.to or ():
+        if path.suffix not in FORMATS:
+            raise BadInput(f"{path.name} names no format", where="--to", remedy=f"end it with {' or '.join(FORMATS)}")
+    for path in (*(asked.to or ()), *([asked.to_urdf] if asked.to_urdf else [])):
+        if path.exists():
+            raise BadInput("it is there already", where=str(path), remedy="name another file")
+        if not path.parent.is_dir():
+            raise BadInput("its folder is not there", where=str(path), remedy="make it, or name another")
 
 
 def _run(
@@ -126,21 +132,35 @@ def _run(
     config: BodyConfig,
     source: Choice,
     how: dict[str, Any],
-    folder: Path,
+    out: Path | None,
     begun: float,
     *,
     made: Experience | None = None,
     work: Work | None = None,
 ) -> int:
     """Make the movements, fit, test, save, show."""
+    from toddle.outside.body_skills import save_movements
     from toddle.outside.skills import save
     from toddle.reach.body_run import plan, skill_from, tested
+    from toddle.reach.gather import gather
+    from toddle.robots.body import Body
 
     to_do = plan(robot, config, like=body)
-    print(f"{source.spec}: {to_do.why}", file=sys.stderr)
-    experience, stopped = _move(robot, to_do, made, folder, {"choice": asdict(source), "how": how})
-    tell = lambda news: print(f"{source.spec}: {news}", file=sys.stderr)  # noqa: E731
-    skill = skill_from(experience, to_do, source, tell)
+    facts = {"choice": asdict(source), "how": how}
+
+    def tell(news: str) -> None:
+        print(f"{source.spec}: {news}", file=sys.stderr)
+
+    tell(to_do.why)
+    if isinstance(robot, Body):  # its movements cost nothing: no folder before they are known to be worth one
+        experience, stopped = gather(robot, to_do.q, to_do.sight, config.seed), False
+        skill = skill_from(experience, to_do, source, tell)
+        folder = new_folder(out, source.spec) if made is None else out or Path()
+        save_movements(folder, experience, to_do.config, facts, robot)
+    else:
+        folder = new_folder(out, source.spec) if made is None else out or Path()
+        experience, stopped = _move(robot, to_do, made, folder, facts)
+        skill = skill_from(experience, to_do, source, tell)
     for note in skill.fit.notes:
         tell(note)
     skill = tested(skill, robot, body, time.perf_counter() - begun)
@@ -176,24 +196,18 @@ def after(asked: Reach, skill: BodySkill) -> None:
 
 
 def _move(
-    robot: Body | Plant, to_do: Plan, made: Experience | None, folder: Path, facts: dict[str, Any]
+    robot: Plant, to_do: Plan, made: Experience | None, folder: Path, facts: dict[str, Any]
 ) -> tuple[Experience, bool]:
     """The movements of a plan, those that were made already included; and whether somebody asked to stop."""
     from toddle.outside.body_skills import save_movements
     from toddle.outside.terminal import Reporter, stoppable
-    from toddle.reach.gather import Sight, gather, together
-    from toddle.robots.body import Body
+    from toddle.reach.gather import gather, together
 
     config, q = to_do.config, to_do.q
-    look = Sight(config.noise or 0.0, config.angle_noise, config.pose)
-    if isinstance(robot, Body):
-        experience = gather(robot, q, look, config.seed)
-        save_movements(folder, experience, config, facts, robot)
-        return experience, False
     saved, stopped = time.perf_counter(), False
     with Reporter(f"{robot.name} moves", len(q)) as reporter, stoppable() as stop:
         for first in range(0 if made is None else len(made.q), len(q), _CHUNK):
-            more = gather(robot, q[first : first + _CHUNK], look, config.seed)
+            more = gather(robot, q[first : first + _CHUNK], to_do.sight, config.seed)
             made = more if made is None else together(made, more)
             reporter.tell(len(made.q), "")
             if stop.asked:

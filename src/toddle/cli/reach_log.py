@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from toddle.cli.body_folder import leave
 from toddle.cli.reach import Reach
-from toddle.cli.reach_body import after, refuse_file
+from toddle.cli.reach_body import after, refuse_files
 from toddle.cli.run_folder import new_folder, refuse_used, tell_figures
 from toddle.failures import BadInput
 
@@ -23,8 +23,7 @@ def learn_from_log(asked: Reach) -> int:
 
     begun, log_path = time.perf_counter(), asked.from_
     refuse_used(asked.out)
-    for path in (*(asked.to or ()), *([asked.to_urdf] if asked.to_urdf else [])):
-        refuse_file(path)
+    refuse_files(asked)
     source = settled(Choice(asked.robot or "", asked.tip, asked.base, asked.joints))
     described = load_choice(source) if asked.robot is not None else None
     if described is not None and not isinstance(described, Chain):

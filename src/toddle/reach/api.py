@@ -158,7 +158,8 @@ def solve(
 
 def _body_config(options: Options) -> BodyConfig:
     given: dict[str, Any] = {"movements" if name == "samples" else name: value for name, value in options.items()}
-    return BodyConfig(**{name: value for name, value in given.items() if value is not None or name == "noise"})
+    kept: dict[str, Any] = {name: value for name, value in given.items() if value is not None or name == "noise"}
+    return BodyConfig(**kept)
 
 
 def skill_of(session: Session, cycle: Cycle, source: Choice, *, pace: Pace) -> Skill:

@@ -42,6 +42,11 @@ class Plan:
     known: Known
     q: Float[np.ndarray, "movements joints"]
 
+    @property
+    def sight(self) -> Sight:
+        """How the tip is seen."""
+        return Sight(self.config.noise or 0.0, self.config.angle_noise, self.config.pose)
+
 
 def plan(body: Body | Plant, config: BodyConfig, *, like: Body | None = None) -> Plan:
     """Settle what a run will do.
@@ -89,9 +94,8 @@ def learn_body(
     """
     begun = time.perf_counter()
     to_do = plan(robot, config, like=like)
-    sight = Sight(config.noise or 0.0, config.angle_noise, config.pose)
     if experience is None:
-        experience = gather(robot, to_do.q, sight, config.seed)
+        experience = gather(robot, to_do.q, to_do.sight, config.seed)
     skill = skill_from(experience, to_do, source, tell)
     return tested(skill, robot, like, time.perf_counter() - begun)
 

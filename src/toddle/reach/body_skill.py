@@ -174,7 +174,7 @@ def _looked(
 ) -> Solution:
     """The answer after looking where the tip went."""
     course = correct(
-        skill.fit.model, observe, aim[None], q[None], looks, sensor=skill.config.look_noise,
+        skill.fit.model, skill.solver, observe, aim[None], q[None], looks, sensor=skill.config.look_noise,
         lower=skill.lower, upper=skill.upper,
     )  # fmt: skip
     error = float(course.expected[-1, 0])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -69,6 +69,7 @@ class Step:
     news: str
 
 
+@runtime_checkable
 class Adaptation(Protocol):
     """A body's picture of itself while it works: it is shown every movement, and may change its mind."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -18,6 +18,7 @@ Choice = Literal["first", "nearest", "central"]
 _MANY = 24  # starts where a target seems out of reach
 
 
+@runtime_checkable
 class Solver(Protocol):
     """Joint values within the limits that bring a model's tip to targets."""
 
