@@ -52,7 +52,7 @@ class Widths(NamedTuple):
     tip: float | None = None
 
 
-STRAIGHT = (3e-4, 2e-4)  # tilts [rad] and gains of a description that is right about them
+STRAIGHT = (3e-4, 0.0)  # tilts [rad] and gains of a description that is right about them
 
 
 @dataclass(frozen=True)

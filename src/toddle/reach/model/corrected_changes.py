@@ -102,7 +102,7 @@ def _line(change: Change) -> str:
     if change.joint != "tip":
         unit, scale = ("mm", 1e3) if change.slides else ("deg", 180 / np.pi)
         off = f"zero off by {scale * change.zero:+.2f} ± {scale * change.zero_sd:.2f} {unit}"
-        parts.append(off if change.seen > 0.5 else "zero not seen (the tip lies on its axis)")
+        parts.append(off if change.seen > 0.5 else "zero not seen (the tip lies on its axis, or close to it)")
     x, y, z = 1e3 * change.shift
     size, doubt = 1e3 * np.linalg.norm(change.shift), 1e3 * np.linalg.norm(change.shift_sd)
     parts.append(f"shifted by {size:.1f} ± {doubt:.1f} mm ({x:+.1f} {y:+.1f} {z:+.1f})")
@@ -122,7 +122,8 @@ def _shown(seen: Seen, found: Changes, seed: int) -> Float[np.ndarray, "numbers 
     sd = found.belief.sd
     flat = residuals(everywhere, found.numbers)[1].reshape(-1, len(sd)) * sd / _SHARP
     square = flat.T @ flat
-    return sd[:, None] * np.linalg.solve(square + np.eye(len(sd)), square) / sd
+    shown = sd[:, None] * np.linalg.solve(square + np.eye(len(sd)), square)
+    return np.divide(shown, sd, out=np.zeros_like(shown), where=sd > 0)
 
 
 def _honest(sd: Float[np.ndarray, " numbers"], share: Float[np.ndarray, " numbers"], found: Changes, at: int) -> float:
