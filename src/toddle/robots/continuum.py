@@ -74,11 +74,17 @@ def segment(lengths: Float[Array, "3"], radius: Float[Array, ""]) -> tuple[Float
     second, third = lengths[1] - lengths[0], lengths[2] - lengths[0]
     arc = lengths[0] + (second + third) / 3  # the mean, without rounding where all are equal
     bx, by = (second + third) / (3 * radius), math.sqrt(3) * (third - second) / (3 * radius)
+    return turn_and_shift(jnp.stack([bx, by]), arc)
+
+
+def turn_and_shift(bend: Float[Array, "2"], arc: Float[Array, ""]) -> tuple[Float[Array, "3 3"], Float[Array, "3"]]:
+    """Turn and shift [m] along an arc [m] that bends by an angle |bend| [rad] towards its direction."""
+    bx, by = bend[0], bend[1]
     sinc, versine = _sinc_and_versine(bx * bx + by * by)
     zero = jnp.zeros_like(bx)
     # Rodrigues' formula about the axis (-by, bx, 0): the segment bends towards (bx, by) and does not twist.
     cross = jnp.array([[zero, zero, bx], [zero, zero, by], [-bx, -by, zero]])
-    turn = jnp.eye(3, dtype=lengths.dtype) + sinc * cross + versine * (cross @ cross)
+    turn = jnp.eye(3, dtype=bend.dtype) + sinc * cross + versine * (cross @ cross)
     return turn, arc * jnp.stack([versine * bx, versine * by, sinc])
 
 

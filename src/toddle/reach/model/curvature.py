@@ -19,10 +19,11 @@ from toddle.failures import BadInput
 from toddle.reach.model.curvature_chain import Shape, joint_slopes, number_slopes, places, tips
 from toddle.reach.model.curvature_descent import Seen, descend, doubted, quadratic, spread_of, tame
 from toddle.reach.model.curvature_prior import joined, learned, regularities, sizes_of_numbers, weak
+from toddle.reach.model.curvature_start import quadratic_of, start
 from toddle.reach.model.model import Fit
 from toddle.signals import Experience
 
-_STARTS, _START_MOVEMENTS, _START_ITERATIONS = 24, 300, 60
+_STARTS, _START_MOVEMENTS, _START_ITERATIONS = 8, 300, 60
 _SAME = 1.05  # two starts that end within this ratio of spread have found the same arm
 
 Numbers = Float[np.ndarray, " numbers"]
@@ -120,7 +121,8 @@ def fit_curvature(
         )
     rng = np.random.default_rng(seed)
     scale = float(np.sqrt(np.median(((x - np.median(x, axis=0)) ** 2).sum(1)))) + 1e-9
-    found = min((_searched(shape, q, x, scale, rng) for shape in shapes), key=lambda one: one.cost)
+    some = rng.permutation(len(q))[:_START_MOVEMENTS]
+    found = min((_searched(shape, q[some], x[some], scale, rng) for shape in shapes), key=lambda one: one.cost)
     return _polished(found, q, x, scale, began, joints)
 
 
@@ -148,15 +150,14 @@ def _searched(
     rng: np.random.Generator,
 ) -> _Found:
     """The best of several starts, judged by the median miss; two that agree are enough."""
-    some = rng.permutation(len(q))[:_START_MOVEMENTS]
-    q, x = q[some], x[some]
+    known = quadratic_of(shape, q, x)
     prior, sizes = joined(weak(shape, scale), places(shape).total), sizes_of_numbers(shape, scale)
     ends: list[tuple[float, Numbers]] = []
-    for _ in range(_STARTS):
-        numbers, weight = _start(shape, x, scale, rng), np.ones(len(q))
-        for width, iterations in ((np.inf, _START_ITERATIONS), (0.3, 15), (0.1, 15)):
-            weight = doubted(x - tips(shape, numbers, q), width * scale)
+    for number in range(_STARTS):
+        numbers, weight = start(shape, known, scale, number, rng), known.weight
+        for width, iterations in ((0.3, _START_ITERATIONS), (0.1, 15)):
             numbers, _ = descend(shape, numbers, Seen(q, x, weight), prior, sizes, 0.03 * scale, iterations)
+            weight = doubted(x - tips(shape, numbers, q), width * scale)
         ends.append((spread_of(x - tips(shape, numbers, q)), numbers))
         ends.sort(key=lambda end: end[0])
         if len(ends) > 1 and ends[1][0] < _SAME * ends[0][0]:
@@ -164,18 +165,6 @@ def _searched(
     sigma, numbers = ends[0]
     informed = x.size * np.log(sigma) + 0.5 * len(numbers) * np.log(x.size)  # Schwarz' criterion
     return _Found(shape, numbers, sigma, informed)
-
-
-def _start(shape: Shape, x: Float[np.ndarray, "movements space"], scale: float, rng: np.random.Generator) -> Numbers:
-    where = places(shape)
-    numbers = np.zeros(where.total)
-    numbers[where.tilt] = rng.normal(size=2)
-    for part in where.segments:
-        weights = np.zeros((3, (part.stop - part.start) // 3))
-        weights[:2] = 0.2 * rng.normal(size=weights[:2].shape)
-        weights[2, 0] = scale / 2
-        numbers[part] = weights.ravel()
-    return numbers
 
 
 def _polished(
@@ -190,7 +179,7 @@ def _polished(
     shape, numbers, sigma = found.shape, found.numbers, found.sigma
     floor, sizes = joined(weak(shape, scale), len(numbers)), sizes_of_numbers(shape, scale)
     groups, known = [], 0.0
-    good = np.ones(len(q), bool)
+    good = tame(x - tips(shape, numbers, q), sigma)
     covariance = np.zeros((len(numbers), len(numbers)))
     for _ in range(4):
         prior = joined([*weak(shape, scale), *groups], len(numbers))

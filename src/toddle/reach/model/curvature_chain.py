@@ -143,7 +143,7 @@ def sweep(shape: Shape, numbers: Float[np.ndarray, " numbers"], q: Rows) -> Swee
     turn, frames, slopes = np.broadcast_to(np.eye(3), (len(q), 3, 3)), [], []
     for i, (bend, arc) in enumerate(bends):
         slopes.append(turn @ _carry_slope(bend, arc, points[i + 1]))
-        turn = turn @ _turn(bend)
+        turn = turn @ turn_of(bend)
         frames.append(turn)
     tip = points[0].copy()
     tip[:, : shape.space] += numbers[: shape.space]
@@ -161,6 +161,18 @@ def carry(
     moved[:, :2] = point[:, :2] + bend * (v * along + s * point[:, 2])[:, None]
     moved[:, 2] = point[:, 2] * (1 - v * square) + s * along
     return moved
+
+
+def turn_of(bend: Float[np.ndarray, "batch 2"]) -> Float[np.ndarray, "batch 3 3"]:
+    """The turn from a segment's foot to its head, for its bend vector [rad]."""
+    square = (bend * bend).sum(1)
+    s, v, _, _ = _functions(square)
+    turn = np.empty((len(bend), 3, 3))
+    turn[:, :2, :2] = np.eye(2) - v[:, None, None] * bend[:, :, None] * bend[:, None, :]
+    turn[:, :2, 2] = s[:, None] * bend
+    turn[:, 2, :2] = -s[:, None] * bend
+    turn[:, 2, 2] = 1 - v * square
+    return turn
 
 
 def features(u: Float[np.ndarray, "batch own"], order: int) -> Float[np.ndarray, "batch features"]:
@@ -201,17 +213,6 @@ def _bend(
 
 def _tip_offset(numbers: Float[np.ndarray, " numbers"], where: Places, count: int) -> Float[np.ndarray, "batch 3"]:
     return np.tile(numbers[where.tip], (count, 1))
-
-
-def _turn(bend: Float[np.ndarray, "batch 2"]) -> Float[np.ndarray, "batch 3 3"]:
-    square = (bend * bend).sum(1)
-    s, v, _, _ = _functions(square)
-    turn = np.empty((len(bend), 3, 3))
-    turn[:, :2, :2] = np.eye(2) - v[:, None, None] * bend[:, :, None] * bend[:, None, :]
-    turn[:, :2, 2] = s[:, None] * bend
-    turn[:, 2, :2] = -s[:, None] * bend
-    turn[:, 2, 2] = 1 - v * square
-    return turn
 
 
 def _carry_slope(
