@@ -12,11 +12,14 @@ from jaxtyping import Float
 PLACES = 4
 """Movements of each joint: three points make a circle, two more show whether it is one."""
 
+LOOKS = 3
+"""How often home is looked at: all joints' movements hang on it, and one look may be wild."""
+
 
 def isolating_movements(
     lower: Float[np.ndarray, " joints"], upper: Float[np.ndarray, " joints"], home: Float[np.ndarray, " joints"]
 ) -> Float[np.ndarray, "movements joints"]:
-    """Home, and then every joint by itself at four places across its range, at most half a turn from home.
+    """Home three times, then every joint by itself at four places across its range, at most half a turn from home.
 
     Args:
         lower: lower limits [rad or m].
@@ -24,10 +27,10 @@ def isolating_movements(
         home: where all joints but one stay [rad or m].
     """
     low, high = np.maximum(lower, home - np.pi), np.minimum(upper, home + np.pi)
-    movements = np.tile(home, (1 + PLACES * len(home), 1)).astype(float)
+    movements = np.tile(home, (LOOKS + PLACES * len(home), 1)).astype(float)
     for joint in range(len(home)):
         places = np.linspace(low[joint], high[joint], 2 * PLACES + 1)[1::2]
-        # the one nearest to home tells nothing: go to the ends instead
         places[0], places[-1] = low[joint], high[joint]
-        movements[1 + PLACES * joint : 1 + PLACES * (joint + 1), joint] = places
+        first = LOOKS + PLACES * joint
+        movements[first : first + PLACES, joint] = places
     return movements

@@ -33,9 +33,9 @@ def checked(experience: Experience, joints: tuple[str, ...]) -> tuple[Experience
             where="movements",
             remedy="give x, y (and z) of the tip for each movement",
         )
-    whole = np.isfinite(q).all(axis=1) & np.isfinite(x).all(axis=1)
+    whole = np.asarray(np.isfinite(q).all(axis=1) & np.isfinite(x).all(axis=1))
     if turn is not None:
-        whole &= np.isfinite(turn).all(axis=(1, 2))
+        whole = whole & np.isfinite(turn).all(axis=(1, 2))
     good = Experience(
         q[whole].astype(float), x[whole].astype(float), None if turn is None else turn[whole].astype(float)
     )

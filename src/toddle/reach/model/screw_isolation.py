@@ -17,6 +17,8 @@ from toddle.reach.model.screw_steps import Seen, descend
 from toddle.reach.model.screw_types import free_numbers, held_numbers, sliding, suspects
 
 _STARTS = 6
+_UNUSUAL = 5.0  # times as large as the joints' median: not one axis, or a wild movement
+_EXACT = 1e-9  # [m]
 _FEWEST = 2  # movements of a joint, besides where all stay
 
 
@@ -76,8 +78,18 @@ def isolated(seen: Seen, slides: Float[np.ndarray, " joints"] | None, rng: np.ra
     posture = seen.q[row]
     tip = np.median(seen.x[joint_of == -1], axis=0)
     known = np.full(joints, np.nan) if slides is None else slides
-    lines = [_axis(seen, posture, joint_of, joint, float(known[joint]), rng) for joint in range(joints)]
-    along, through, slides, gain, miss = (np.array(values) for values in zip(*lines, strict=True))
+    q, x = seen.q - posture, seen.x
+    paths = []
+    for joint in range(joints):
+        own = joint_of == joint
+        angles, places = np.append(q[own, joint], 0.0)[:, None], np.concatenate([x[own], tip[None]])
+        paths.append(seen._replace(q=angles, x=places, turn=None))
+    axes = [_axis(path, float(kind), rng) for path, kind in zip(paths, known, strict=True)]
+    usual = float(np.median([axis.miss for axis in axes]))
+    for joint, (path, kind) in enumerate(zip(paths, known, strict=True)):
+        if axes[joint].miss > _UNUSUAL * usual + _EXACT and len(path.q) > _FEWEST + 2:
+            axes[joint] = _without_one(axes[joint], path, float(kind), usual, rng)
+    along, through, slides, gain, miss = (np.array(values) for values in zip(*axes, strict=True))
     return Isolated(along, through, slides, gain, miss, tip, posture)
 
 
@@ -96,32 +108,43 @@ def isolated_arms(found: Isolated, count: int, seen: Seen, rng: np.random.Genera
 
 def doubtful(miss: Float[np.ndarray, " joints"]) -> Bool[np.ndarray, " joints"]:
     """Joints whose own movements are explained much worse than the others'."""
-    return miss > 5 * np.median(miss) + 1e-9
+    return miss > _UNUSUAL * np.median(miss) + _EXACT
 
 
-def _axis(
-    seen: Seen, posture: np.ndarray, joint_of: np.ndarray, joint: int, slides: float, rng: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray, float, float, float]:
-    """Direction, point, whether it slides, gain and miss of one joint's axis."""
-    rows = np.flatnonzero((joint_of == joint) | (joint_of == -1))
-    own = seen._replace(q=seen.q[rows][:, [joint]] - posture[joint], x=seen.x[rows], turn=None)
+class _Axis(NamedTuple):
+    along: Float[np.ndarray, "3"]
+    through: Float[np.ndarray, "3"]
+    slides: float
+    gain: float
+    miss: float
+
+
+def _without_one(all_of_it: _Axis, path: Seen, slides: float, usual: float, rng: np.random.Generator) -> _Axis:
+    """The axis without the movement that spoils it, if one does."""
+    rows = np.arange(len(path.q))
+    axes = [_axis(path.some(rows != row), slides, rng) for row in rows[:-1]]
+    best = min(axes, key=lambda axis: axis.miss)
+    return best if best.miss < _UNUSUAL * usual + _EXACT else all_of_it
+
+
+def _axis(path: Seen, slides: float, rng: np.random.Generator) -> _Axis:
+    """The axis of one joint from its own movements; slides: 1.0, 0.0, or NaN: to be found out."""
     best, least = None, np.inf
     for loose in (False, True):
-        arms = random_arms(_STARTS, own, np.array([float(slides > 0)]), np.zeros(1, int), rng)
-        free = free_numbers(1, seen.rows, gains=loose)
-        cost, arms = _fitted(arms, own, free, np.array([loose]))
+        arms = random_arms(_STARTS, path, np.array([float(slides > 0)]), np.zeros(1, int), rng)
+        free = free_numbers(1, path.rows, gains=loose)
+        cost, arms = _fitted(arms, path, free, np.array([loose]))
         arms = arms.pick(int(cost.argmin()))
         if loose and np.isnan(slides):
-            slid = sliding(arms, suspects(arms, np.ptp(own.q, axis=0)))
-            more, slid = _fitted(slid, own, free, np.array([True]))
-            arms, cost = (slid, more) if more[0] < 1.5 * cost.min() + 1e-24 else (arms, cost)
-        spare = max(seen.rows * len(rows) - len(free), 1)
-        miss = float(np.sqrt(cost.min() / spare))
+            slid = sliding(arms, suspects(arms, np.ptp(path.q, axis=0)))
+            more, slid = _fitted(slid, path, free, np.array([True]))
+            arms, cost = (slid, more) if more[0] < 1.5 * cost.min() + _EXACT**2 else (arms, cost)
+        miss = float(np.sqrt(cost.min() / max(path.rows * len(path.q) - len(free), 1)))
         if miss < 0.7 * least:
             best, least = arms, miss
     assert best is not None
     along, through, _ = lines_of(best)
-    return along[0, 0], through[0, 0], float(best.slides[0, 0]), float(best.gain[0, 0]), least
+    return _Axis(along[0, 0], through[0, 0], float(best.slides[0, 0]), float(best.gain[0, 0]), least)
 
 
 def _fitted(arms: Arms, seen: Seen, free: np.ndarray, gains: np.ndarray) -> tuple[np.ndarray, Arms]:

@@ -73,7 +73,7 @@ def _group(
     if shown is None:
         return drawn
     along, through, _ = lines_of(drawn)
-    keeps = (order != motor)[:, None]
+    keeps = ((order != motor) & ~doubtful(shown.miss)[order])[:, None]
     arms = from_lines(
         np.where(keeps, shown.along[order], along),
         np.where(keeps, shown.through[order], through),
@@ -81,5 +81,5 @@ def _group(
         np.tile(shown.tip, (_STARTS, 1)),
         drawn.motor,
     )
-    gain = np.where(order == motor, 1.0, shown.gain[order] if gains else np.sign(shown.gain[order]))
+    gain = np.where(~keeps[:, 0], 1.0, shown.gain[order] if gains else np.sign(shown.gain[order]))
     return recentred(arms._replace(gain=np.tile(gain, (_STARTS, 1))), -shown.posture)

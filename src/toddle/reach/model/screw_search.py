@@ -74,8 +74,10 @@ def _proposals(task: _Task) -> Iterator[Candidate]:
     joints = task.seen.q.shape[1]
     shown = isolated(task.seen, task.slides, task.rng)
     if shown is not None:
-        yield from _as_shown(shown, task)
         if doubtful(shown.miss).any():
+            yield from _with_followers(shown, task)
+        yield from _as_shown(shown, task)
+        for _ in range(_ROUNDS if doubtful(shown.miss).any() else 0):
             yield from _with_followers(shown, task)
     for turn in range(_ROUNDS):
         yield tried(_starts(task, gains=False), np.zeros(joints, bool), task)[0]
@@ -100,11 +102,15 @@ def _as_shown(shown: Isolated, task: _Task) -> Iterator[Candidate]:
     """From the axes that movements of single joints showed."""
     joints = len(shown.gain)
     count = 8 if doubtful(shown.miss).any() else 1
-    unit = np.abs(np.abs(shown.gain) - 1) < _UNIT
-    if unit.all():
+    if _near_unit(shown).all():
         rounded = shown._replace(gain=np.sign(shown.gain))
         yield tried(isolated_arms(rounded, count, task.seen, task.rng), np.zeros(joints, bool), task)[0]
     yield tried(isolated_arms(shown, count, task.seen, task.rng), np.ones(joints, bool), task)[0]
+
+
+def _near_unit(shown: Isolated) -> Bool[np.ndarray, " joints"]:
+    """Joints whose gain may be 1, and those that nothing is known of."""
+    return (np.abs(np.abs(shown.gain) - 1) < _UNIT) | doubtful(shown.miss)
 
 
 def _with_slides(candidate: Candidate, task: _Task) -> Iterator[Candidate]:
@@ -120,7 +126,8 @@ def _with_slides(candidate: Candidate, task: _Task) -> Iterator[Candidate]:
 
 def _with_followers(shown: Isolated | None, task: _Task) -> Iterator[Candidate]:
     """With one more axis, driven by a motor that drives another already."""
-    for gains in (False, True):
+    unit = shown is None or bool(_near_unit(shown).all())
+    for gains in (not unit, unit):
         arms, extra = with_followers(shown, task.few, task.slides, task.rng, gains=gains)
         loose = np.ones(arms.slides.shape, bool) if gains else extra
         yield tried(arms, loose, task)[0]

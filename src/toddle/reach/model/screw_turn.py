@@ -15,6 +15,7 @@ from toddle.reach.model.screw_steps import NONE, Seen, descend, look, turned
 from toddle.reach.model.screw_types import free_numbers, held_numbers
 
 _STARTS = 16
+_SUBSET = 100  # movements that starts are tried on
 
 
 def with_turns(arms: Arms, gains: np.ndarray, seen: Seen, sigma: float, rng: np.random.Generator) -> tuple[Arms, Seen]:
@@ -29,11 +30,12 @@ def with_turns(arms: Arms, gains: np.ndarray, seen: Seen, sigma: float, rng: np.
     """
     seen = seen._replace(lever=0.3 * float(seen.x.std()))
     starts = _tips_set(_idle_redrawn(arms, seen, sigma, rng), seen)
+    few = seen.some(rng.permutation(len(seen.q))[:_SUBSET])
     free = free_numbers(arms.slides.shape[1], seen.rows, gains=True, turns=True)
     best = None
     for loose in (gains, np.ones(len(gains), bool)):
         held = held_numbers(starts, free, seen.rows, loose)
-        found, _, square = descend(starts, seen, free, steps=40, held=held, scale=2 * seen.lever)
+        found, _, square = descend(starts, few, free, steps=40, held=held, scale=2 * seen.lever)
         cost = np.median(square, axis=1)
         best = found.pick(int(cost.argmin()))
         if cost.min() < (0.1 * seen.lever) ** 2:
