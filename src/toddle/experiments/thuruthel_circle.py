@@ -85,8 +85,8 @@ def judged(found: list[Followed]) -> tuple[bool, str]:
     holds = second <= ENOUGH * first and second <= ENOUGH * settled and far <= 1000 * GOOD
     corrected = float(np.mean([run.corrected[AROUND:] for run in found]))
     verdict = (
-        f"rounds at {first:.1f} and {second:.1f} mm, {settled:.1f} if the arm may settle at each point, at most {far:.0f} "
-        f"once on the circle; with feedback {corrected:.1f} mm; mean of {len(found)} runs"
+        f"rounds at {first:.1f} and {second:.1f} mm, {settled:.1f} if the arm may settle at each point, at most "
+        f"{far:.0f} once on the circle; with feedback {corrected:.1f} mm; mean of {len(found)} runs"
     )
     return holds, verdict
 

@@ -124,10 +124,10 @@ def _lower(
 ) -> Course | None:
     """The first step with a lower F, mu growing from trial to trial; None: there is none."""
     objective = now.beta * now.errors + now.alpha * now.squares
-    turned = _turned(decomposed, slope, "T")
+    downhill = turned(decomposed, slope, "T")
     damping = max(now.damping * _LESS, _LEAST_DAMPING)
     while damping <= _MOST_DAMPING:
-        step = _turned(decomposed, _solved(decomposed, now.beta, now.alpha + damping, turned), "N")
+        step = turned(decomposed, solved(decomposed, now.beta, now.alpha + damping, downhill), "N")
         weights = now.weights.less(step)
         errors, squares = squared_errors(weights, samples), _squares(weights)
         if now.beta * errors + now.alpha * squares < objective:
@@ -176,13 +176,13 @@ def decompose(matrix: Float[np.ndarray, "weights weights"]) -> Decomposed:
     return Decomposed(reflections, scales, diagonal, beside, eigenvalues)
 
 
-def _turned(decomposed: Decomposed, vector: Float[np.ndarray, " weights"], how: str) -> Float[np.ndarray, " weights"]:
+def turned(decomposed: Decomposed, vector: Float[np.ndarray, " weights"], how: str) -> Float[np.ndarray, " weights"]:
     """Q' v ("T") or Q v ("N"); the first row and column of Q are those of the identity."""
     tail, _, _ = _ormqr("L", how, decomposed.reflections[1:, :-1], decomposed.scales, vector[1:, None], 64)
     return np.concatenate([vector[:1], tail[:, 0]])
 
 
-def _solved(
+def solved(
     decomposed: Decomposed, beta: float, shift: float, vector: Float[np.ndarray, " weights"]
 ) -> Float[np.ndarray, " weights"]:
     """(beta T + shift I)^-1 v."""
