@@ -120,13 +120,13 @@ def correct(
 
 def _by_evidence(seen: Seen, widths: Widths) -> Changes:
     """Links straight or tilted, gains right or off: whichever makes the movements most probable."""
-    found: Changes | None = None
-    for turn, gain in ((False, False), (True, False), (False, True), (True, True)):
+    straight = widths._replace(turn=STRAIGHT[0], gain=STRAIGHT[1])
+    found = near = most_probable(seen, _belief(seen.nominal, straight))
+    for turn, gain in ((True, False), (False, True), (True, True)):
         taken = widths._replace(turn=widths.turn if turn else STRAIGHT[0], gain=widths.gain if gain else STRAIGHT[1])
-        trial = most_probable(seen, _belief(seen.nominal, taken, turn=turn, gain=gain))
-        if found is None or trial.evidence > found.evidence:
-            found = trial
-    assert found is not None
+        belief = _belief(seen.nominal, taken, turn=turn, gain=gain)
+        trial = most_probable(seen, belief, start=near.numbers)
+        found = max(found, trial, key=lambda changes: changes.evidence)
     return found
 
 

@@ -79,9 +79,16 @@ class Changes(NamedTuple):
     evidence: float
 
 
-def most_probable(seen: Seen, belief: Belief, *, start: Numbers | None = None, rounds: int = 8) -> Changes:
-    """Fit the numbers, robustly, and the noise levels with them."""
-    numbers = _annealed(seen, belief, np.zeros(len(belief.sd)) if start is None else start)
+def most_probable(seen: Seen, belief: Belief, *, start: Numbers | None = None, rounds: int = 10) -> Changes:
+    """The most probable numbers, and the noise levels and widths with them.
+
+    Args:
+        seen: the description and the movements.
+        belief: how wrong the description may be.
+        start: numbers that are near already; None: come near from the description.
+        rounds: how often widths and levels are revised at most; they are settled when they change by less than 1 %.
+    """
+    numbers = _annealed(seen, belief) if start is None else start
     residual, slope = residuals(seen, numbers)
     level = _robust_level(seen, residual)
     keep = np.ones(len(seen.q), bool)
@@ -90,8 +97,11 @@ def most_probable(seen: Seen, belief: Belief, *, start: Numbers | None = None, r
         keep = _kept(residual / level, keep, slope / level[:, None], belief.sd)
         numbers = _descend(seen, numbers, level, keep.astype(float), belief.sd)
         residual, slope = residuals(seen, numbers)
+        was = level
         unsure, level = _levels(seen, residual[keep], slope[keep], level, belief.sd)
-        belief = _widths(belief, first, numbers, unsure)
+        before, belief = belief, _widths(belief, first, numbers, unsure)
+        if np.allclose(belief.sd, before.sd, rtol=0.01) and np.allclose(level, was, rtol=0.01):
+            break
     unsure = _unsure((slope / level[:, None])[keep], belief.sd)
     covariance = belief.sd[:, None] * unsure * belief.sd
     evidence = _evidence(residual / level, numbers, unsure, level, belief.sd)
@@ -132,7 +142,7 @@ def blockwise(slope: Float[np.ndarray, "*batch numbers"], numbers: Numbers) -> F
 def _turn_rate(turn: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
     """The right Jacobian of the rotation group: exp(turn + d) = exp(turn) exp(J d)."""
     angle = float(np.linalg.norm(turn))
-    cross = np.cross(np.eye(3), -turn)
+    cross = np.cross(turn, np.eye(3)).T
     if angle < 1e-6:
         return np.eye(3) - cross / 2
     return np.eye(3) - (1 - np.cos(angle)) / angle**2 * cross + (angle - np.sin(angle)) / angle**3 * (cross @ cross)
@@ -143,8 +153,9 @@ def _noise(seen: Seen, position: float, orientation: float) -> Float[np.ndarray,
     return np.array([position] * len(seen.coordinates) + [orientation] * turns)
 
 
-def _annealed(seen: Seen, belief: Belief, numbers: Numbers) -> Numbers:
+def _annealed(seen: Seen, belief: Belief) -> Numbers:
     """Come near, from far away, with a noise level that falls from the first misses to the last."""
+    numbers = np.zeros(len(belief.sd))
     guess = _noise(seen, *SENSOR)
     scale = np.inf
     for _ in range(16):

@@ -67,7 +67,7 @@ def _start(nominal: Linkage, zero: Float[np.ndarray, " joints"], flipped: Bool[n
 
 
 def _name(start: Start) -> tuple[float, ...]:
-    return (*np.round(np.mod(start.zero, 2 * np.pi), 6), *start.flipped)
+    return (*np.round(np.mod(start.zero, 2 * np.pi), 6).tolist(), *start.flipped.astype(float).tolist())
 
 
 def _miss(seen: Seen, start: Start) -> float:
