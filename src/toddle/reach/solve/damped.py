@@ -26,9 +26,10 @@ from toddle.signals import Verdict
 
 Choice = Literal["first", "nearest", "central"]
 RADIAN = 0.3  # what an angle of a radian counts for [m]
-_COMPARED = 6  # solutions among which the nearest is chosen
-_ENDS = 12  # of the starts that failed, how many are brought to their minimum
-_MANY = 128  # solutions among which distinct ones are chosen
+_WANTED: dict[Choice, int] = {"first": 1, "nearest": 8, "central": 8}  # solutions to compare
+_ENDS = 16  # of the starts that failed, how many are brought to their minimum
+_THOROUGH = 40  # and where nothing but the nearest is asked for
+_MANY = 60  # solutions among which distinct ones are chosen
 _BLOCK = 4096  # targets at a time
 
 
@@ -55,6 +56,12 @@ class DampedSolver:
     def upper(self) -> Float[np.ndarray, " joints"]:
         """Upper limits [rad or m]."""
         return self.arm.joints[1]
+
+    @property
+    def _place(self) -> slice | list[int]:
+        """Where a target's coordinates belong; a slice is the quicker index."""
+        count = len(self.coordinates)
+        return slice(count) if self.coordinates == (0, 1, 2)[:count] else list(self.coordinates)
 
     def solve(
         self,
@@ -88,7 +95,8 @@ class DampedSolver:
         for first in range(0, len(aims), _BLOCK):
             part = slice(first, first + _BLOCK)
             present = nears if nears is None or len(nears) == 1 else nears[part]
-            found[part] = self._answers(aims[part], rows, present, choice)
+            ends = self._search(aims[part], rows, present, _ENDS, _WANTED[choice])
+            found[part] = self._chosen(ends, aims[part], rows, present, choice)
         q = found[:, :-3]
         held = (q <= self.lower) | (q >= self.upper)
         return Answers(q, found[:, -3], found[:, -2], found[:, -1] == REACHED, held)
@@ -106,15 +114,33 @@ class DampedSolver:
             BadInput: the arrays don't fit the arm, a number isn't finite, or the turn is no rotation.
         """
         aim = self._aim(target, turn)
-        nears = None if near is None else self._nears(near, 1)
-        row = self._answers(aim, 3 if turn is None else 6, nears, choice)[0]
+        rows, nears = 3 if turn is None else 6, None if near is None else self._nears(near, 1)
+        found = self._search(aim, rows, nears, _ENDS, _WANTED[choice])
+        row = found[0, 0]
+        if choice != "first" or row[-1] != REACHED:
+            row = self._chosen(found, aim, rows, nears, choice)[0]
         return Answer(row[:-3], float(row[-3]), float(row[-2]), bool(row[-1] == REACHED))
+
+    def nearest(
+        self, target: Float[np.ndarray, " space"], turn: Float[np.ndarray, "3 3"] | None = None
+    ) -> tuple[Float[np.ndarray, " joints"], float, float]:
+        """The posture that comes nearest to a target, and how far it stays from it [m], [rad].
+
+        Looks longer than `solve` does: for the least of distance squared and (0.3 m times the angle) squared.
+
+        Raises:
+            BadInput: as `solve`.
+        """
+        aim, rows = self._aim(target, turn), 3 if turn is None else 6
+        found = self._search(aim, rows, None, _THOROUGH)
+        row = found[0, 0] if found[0, 0, -1] == REACHED else settled(self.arm, aim, rows, found)[0]
+        return row[:-3], float(row[-3]), float(row[-2])
 
     def distinct(
         self,
         target: Float[np.ndarray, " space"],
         turn: Float[np.ndarray, "3 3"] | None = None,
-        count: int = 8,
+        count: int = 4,
         *,
         near: Float[np.ndarray, " joints"] | None = None,
     ) -> Float[np.ndarray, "solutions joints"]:
@@ -134,7 +160,7 @@ class DampedSolver:
         """
         aim = self._aim(target, turn)
         nears = self.arm.joints[3:4] if near is None else self._nears(near, 1)
-        found = self._search(aim, 3 if turn is None else 6, nears, -1, _MANY, _MANY)[0]
+        found = self._search(aim, 3 if turn is None else 6, nears, _MANY, _MANY)[0]
         return unlike(self.arm, found[found[:, -1] == REACHED, :-3], nears[0], count)
 
     def judge(
@@ -153,27 +179,29 @@ class DampedSolver:
             return Judgement(Verdict.REACHED)
         return judged(self.arm, self._aim(target, turn)[0], 3 if turn is None else 6, answer.q)
 
-    def _answers(self, aims: np.ndarray, rows: int, nears: np.ndarray | None, choice: Choice) -> np.ndarray:
-        """(batch, joints + 3) the answers chosen for a batch of aims."""
-        middle = self.arm.joints[3:4]
-        wanted = 1 if choice == "first" else _COMPARED
-        found = self._search(aims, rows, middle if nears is None else nears, 0 if nears is None else -1, wanted, _ENDS)
+    def _chosen(
+        self, found: np.ndarray, aims: np.ndarray, rows: int, nears: np.ndarray | None, choice: Choice
+    ) -> np.ndarray:
+        """(batch, joints + 3) one answer for each target, from all that was found."""
         best = found[:, 0]
         lost = best[:, -1] != REACHED
         if choice != "first":
+            middle = self.arm.joints[3:4]
             towards = middle if choice == "central" or nears is None else nears
             best = draw_near(self.arm, aims, rows, found, np.broadcast_to(towards, (len(aims), middle.shape[1])))
         if lost.any():
             best[lost] = settled(self.arm, aims[lost], rows, found[lost])
         return best
 
-    def _search(self, aims: np.ndarray, rows: int, nears: np.ndarray, begin: int, wanted: int, ends: int) -> np.ndarray:
-        found = np.empty((len(aims), ends, self.arm.joints.shape[1] + 3))
-        search(self.arm, aims, rows, nears, begin, max(self.tries, wanted), wanted, found)
-        refused = found[:, 0, -1] == REFUSED
-        if refused.any():
+    def _search(self, aims: np.ndarray, rows: int, nears: np.ndarray | None, ends: int, wanted: int = 1) -> np.ndarray:
+        """(batch, ends, joints + 3) what the kernel finds."""
+        arm = self.arm
+        found = np.empty((len(aims), ends, arm.joints.shape[1] + 3))
+        first = 0 if nears is None else -1
+        search(arm, aims, rows, arm.joints[3:4] if nears is None else nears, first, self.tries, wanted, found)
+        if found[0, 0, -1] == REFUSED or (len(aims) > 1 and (found[:, 0, -1] == REFUSED).any()):
             raise BadInput(
-                f"target {int(np.argmax(refused))} is not finite, more than 1000 km away, or its turn is no rotation",
+                f"target {np.argmax(found[:, 0, -1] == REFUSED)} isn't finite, 1000 km away, or turned by no rotation",
                 remedy="give metres, and a rotation matrix for the turn",
             )
         return found
@@ -181,9 +209,9 @@ class DampedSolver:
     def _aim(self, target: np.ndarray, turn: np.ndarray | None) -> np.ndarray:
         aim = np.zeros((1, 12))
         try:
-            aim[0, self.coordinates] = target
+            aim[0, self._place] = target
             if turn is not None:
-                aim[0, 3:] = np.reshape(turn, 9)
+                aim[0, 3:] = np.asarray(turn).ravel()
         except (TypeError, ValueError) as error:
             raise BadInput("the target doesn't fit the arm", where=str(error)) from None
         return aim
@@ -193,7 +221,7 @@ class DampedSolver:
         if targets.ndim != 2 or targets.shape[1] != len(self.coordinates):
             raise BadInput(f"targets of shape {targets.shape}", remedy=f"give (batch, {len(self.coordinates)})")
         aims = np.zeros((len(targets), 12))
-        aims[:, self.coordinates] = targets
+        aims[:, self._place] = targets
         if turns is not None:
             if np.shape(turns) != (len(targets), 3, 3):
                 raise BadInput(f"turns of shape {np.shape(turns)}", remedy=f"give ({len(targets)}, 3, 3)")
@@ -210,7 +238,7 @@ class DampedSolver:
         return np.clip(nears, self.lower, self.upper)
 
 
-def solver_for(chain: Chain, *, postures: int = 1024, tries: int = 60, seed: int = 0) -> DampedSolver:
+def solver_for(chain: Chain, *, postures: int = 1024, tries: int = 48, seed: int = 0) -> DampedSolver:
     """The solver of a known robot description; see `damped_solver`."""
     lower, upper = np.asarray(chain.lower, float), np.asarray(chain.upper, float)
     return damped_solver(
@@ -227,7 +255,7 @@ def damped_solver(
     tolerance: float = 1e-5,
     angle_tolerance: float = 1e-4,
     postures: int = 1024,
-    tries: int = 60,
+    tries: int = 48,
     seed: int = 0,
 ) -> DampedSolver:
     """The solver of a linkage.

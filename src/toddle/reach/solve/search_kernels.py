@@ -8,11 +8,12 @@ from numba import njit
 from toddle.reach.solve.damped_kernels import Work, descend
 
 REACHED, FAILED, UNUSED, REFUSED = 1.0, 0.0, -1.0, -2.0
+PULL = 3.0  # towards the posture to be near, where solutions are compared: of the joints' mean square [m^2]
 
 
 @njit(cache=True, error_model="numpy")
-def survey(arm, target, rows, far):
-    """How far the stored postures put the tip from the target: squared [m^2], but for a constant."""
+def survey(arm, target, rows, near, pull, far):
+    """How far each stored posture puts the tip from the target, and is from ``near``: squared [m^2], but a constant."""
     count = far.shape[0]
     for i in range(count):
         far[i] = 0.0
@@ -25,6 +26,10 @@ def survey(arm, target, rows, far):
         value = np.float32(target[r] * arm.weight[3] * arm.weight[3])
         for i in range(count):
             far[i] -= value * arm.places[r, i]
+    for j in range(near.shape[0] if pull > 0.0 else 0):
+        value, weight = near[j], pull / (arm.joints[1, j] - arm.joints[0, j]) ** 2
+        for i in range(count):
+            far[i] += weight * (arm.postures[i, j] - value) ** 2
 
 
 @njit(cache=True, error_model="numpy")
@@ -57,8 +62,8 @@ def search(arm, targets, rows, nears, begin, tries, wanted, found):
         arm: the arm.
         targets: (batch, 12) position [m] and rotation, row by row.
         rows: 3: only the position counts; 6: the pose.
-        nears: a posture to start from, one for all targets or one for each.
-        begin: -1: start from ``nears`` first; 0: leave it.
+        nears: a posture to be near, one for all targets or one for each.
+        begin: -1: start from ``nears`` first; 0: from stored postures only.
         tries: how many stored postures to start from, at most.
         wanted: of how many solutions to stop; not more than there are rows.
         found: (batch, ends, joints + 3) filled in: joint values, distance [m], angle [rad], and `REACHED`, `FAILED`,
@@ -68,19 +73,19 @@ def search(arm, targets, rows, nears, begin, tries, wanted, found):
     work = Work(np.empty((axes, 6)), np.empty((n, 6)), np.empty((2, 6, 6)), np.empty((3, 12)), np.empty((4, n)))
     far, q, merits = np.empty(arm.postures.shape[0], np.float32), np.empty(n), np.empty(ends)
     for b in range(targets.shape[0]):
-        target = targets[b]
+        target, near = targets[b], nears[min(b, nears.shape[0] - 1)]
         for k in range(ends):
             merits[k] = np.inf
             found[b, k, n + 2] = UNUSED
         if not usable(target, rows):
             found[b, 0, n + 2] = REFUSED
             continue
-        survey(arm, target, rows, far)
+        survey(arm, target, rows, near, PULL / n if wanted > 1 else 0.0, far)
         solutions = 0
         for t in range(begin, tries):
             at = least(far)
             for j in range(n):
-                q[j] = nears[min(b, nears.shape[0] - 1), j] if t < 0 else arm.postures[at, j]
+                q[j] = near[j] if t < 0 else arm.postures[at, j]
             if t >= 0:
                 far[at] = np.inf
             squared, angle, within = descend(arm, target, rows, q, work)
