@@ -96,7 +96,7 @@ def test_nine_of_ten_are_within_what_is_said(bent):
 
 
 def test_an_overconfident_model_is_set_right_by_held_out_movements():
-    fit, experience, rng = learned(0)
+    fit, _, rng = learned(0)
     assert isinstance(fit.model, Line)
     bold = Line(fit.model.weights + 5e-3, fit.model.covariance / 100)
     q = rng.uniform(-2, 2, (400, 4))

@@ -1,13 +1,9 @@
 """What happened to a rigid arm, and the arm as it is now, from the few movements since.
 
-Every hypothesis of `toddle.reach.model.damage_hypotheses` is fitted to them by Levenberg-Marquardt, all of them side by
-side, and judged by its evidence in Laplace's approximation (MacKay 1992): with the misses r in units of what noise and
-the model's own doubt explain, the numbers z in units of what was to be expected, and J the slope of r,
-
-    log p = -1/2 (r'r + z'z + log det(I + J'J)).
-
-A bend may explain whatever a slip explains, with five numbers more; the determinant is what it pays for them. A single
-wild look among the movements is found by leaving each out in turn.
+Every hypothesis of `toddle.reach.model.damage_hypotheses` is fitted to them and judged by its evidence
+(`toddle.reach.model.damage_evidence`). A bend may explain whatever a slip explains, with five numbers more; the
+determinant in the evidence is what it pays for them. A single wild look among the movements is found by leaving each
+out in turn.
 """
 
 from __future__ import annotations
@@ -21,13 +17,13 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.spatial.transform import Rotation
 
-from toddle.reach.model.damage_hypotheses import Family, joint_family, link_family, turn_slope
+from toddle.reach.model.damage_evidence import SeenSince, fitted
+from toddle.reach.model.damage_hypotheses import joint_family, link_family, turn_slope
 from toddle.reach.model.damage_watch import JUMP, surprises
 from toddle.reach.model.rigid import PER_AXIS, Rigid, changed
 from toddle.robots.linkage import Linkage
 from toddle.signals import Experience
 
-_ROUNDS = 25
 _KEPT = 1e-3  # hypotheses that are less likely than that are forgotten
 _FEW = 3  # movements, of which one can be told to be wild
 _WILD = 25.0  # log evidence that a wild look must cost: it may be one in a thousand, and anywhere in some cubic metres
@@ -79,7 +75,7 @@ def repair(
 
     def weighed(kept: np.ndarray) -> list[_Cause]:
         some = Experience(since.q[kept], since.x[kept], None if since.turn is None else since.turn[kept])
-        return _weighed(model, some, _Seen.of(model, some, sensor, angle_sensor), (lower, upper, stood))
+        return _weighed(model, some, SeenSince.of(model, some, sensor, angle_sensor), (lower, upper, stood))
 
     kept = np.arange(len(since.q))
     causes = weighed(kept)
@@ -118,40 +114,6 @@ def telling_movement(repairs: tuple[Repair, ...], candidates: Float[np.ndarray, 
     return int(np.argmax(np.linalg.slogdet(doubt + sensor**2 * np.eye(doubt.shape[-1]))[1]))
 
 
-@dataclass(frozen=True)
-class _Seen:
-    """What was seen, and the inverse root of the covariance that noise and the model's doubt explain."""
-
-    rows: list[int]
-    x: Float[np.ndarray, "movements space"]
-    turn: Float[np.ndarray, "movements 3 3"] | None
-    white: Float[np.ndarray, "movements rows rows"]
-
-    @classmethod
-    def of(cls, model: Rigid, since: Experience, sensor: float, angle_sensor: float) -> _Seen:
-        rows = [*model.coordinates, *(() if since.turn is None else (3, 4, 5))]
-        noise = np.diag([sensor**2 if row < 3 else angle_sensor**2 for row in rows])
-        covariance = model.pose_spread(since.q)[:, rows][:, :, rows] + noise
-        return cls(rows, since.x, since.turn, np.linalg.inv(np.linalg.cholesky(covariance)))
-
-    def miss(self, pose: Float[np.ndarray, "cases movements 4 4"]) -> Float[np.ndarray, "cases residuals"]:
-        """How far what was seen is from each prediction, in units of what is explained."""
-        shape = pose.shape[:2]
-        places = [row for row in self.rows if row < 3]
-        miss = np.empty((*shape, len(self.rows)))
-        miss[..., : len(places)] = self.x - pose[..., places, 3]
-        if self.turn is not None:
-            away = self.turn @ np.swapaxes(pose[..., :3, :3], -1, -2)
-            miss[..., len(places) :] = Rotation.from_matrix(away.reshape(-1, 3, 3)).as_rotvec().reshape(*shape, 3)
-        return np.einsum("mij,cmj->cmi", self.white, miss).reshape(shape[0], -1)
-
-    def steep(
-        self, slope: Float[np.ndarray, "cases movements 6 numbers"]
-    ) -> Float[np.ndarray, "cases residuals numbers"]:
-        """The slopes of the predictions in the same units."""
-        return np.einsum("mij,cmjk->cmik", self.white, slope[:, :, self.rows]).reshape(len(slope), -1, slope.shape[3])
-
-
 class _Cause(NamedTuple):
     """A hypothesis, fitted."""
 
@@ -162,7 +124,7 @@ class _Cause(NamedTuple):
 
 
 def _weighed(
-    model: Rigid, since: Experience, seen: _Seen, joints: tuple[np.ndarray, np.ndarray, np.ndarray | None]
+    model: Rigid, since: Experience, seen: SeenSince, joints: tuple[np.ndarray, np.ndarray, np.ndarray | None]
 ) -> list[_Cause]:
     """Every hypothesis fitted to the movements, the likeliest first."""
     miss = seen.miss(model.pose(since.q)[None])
@@ -172,60 +134,12 @@ def _weighed(
         (joint_family(model.linkage, since.q, *joints), _joint_changed),
         (link_family(model.linkage, since.q), _link_changed),
     ):
-        numbers, evidence, covariance = _fitted(family, seen)
+        numbers, evidence, covariance = fitted(family, seen)
         for case, (kind, axis) in enumerate(zip(family.kinds, family.axes, strict=True)):
             make = partial(change, model, kind, axis, numbers[case], covariance[case])
             joint = axis if change is _joint_changed else int(joint_of[axis])
             causes.append(_Cause(kind, joint, float(evidence[case]), make))
     return sorted(causes, key=lambda cause: -cause.evidence)
-
-
-def _fitted(
-    family: Family, seen: _Seen
-) -> tuple[Float[np.ndarray, "cases numbers"], Float[np.ndarray, " cases"], Float[np.ndarray, "cases numbers numbers"]]:
-    """Each hypothesis' numbers, its evidence and the covariance of its numbers; the best of its starts."""
-    best = np.full(len(family.kinds), -np.inf)
-    numbers, covariance = family.mean.copy(), family.root.copy()
-    for start in family.starts:
-        z, evidence, doubt = _descended(family, seen, np.tile(start, (len(best), 1)))
-        better = evidence > best
-        best[better] = evidence[better]
-        found = family.mean + np.einsum("cij,cj->ci", family.root, z)
-        numbers[better] = found[better]
-        covariance[better] = (family.root @ doubt @ np.swapaxes(family.root, 1, 2))[better]
-    return numbers, best, covariance
-
-
-def _descended(
-    family: Family, seen: _Seen, z: Float[np.ndarray, "cases numbers"]
-) -> tuple[Float[np.ndarray, "cases numbers"], Float[np.ndarray, " cases"], Float[np.ndarray, "cases numbers numbers"]]:
-    """Levenberg-Marquardt from z, every case with its own damping: z, its evidence, and its covariance."""
-    eye, damping = np.eye(z.shape[1]), np.full(len(z), 1e-2)
-    cost, gradient, curvature = _around(family, seen, z)
-    for _ in range(_ROUNDS):
-        step = np.linalg.solve(curvature + damping[:, None, None] * eye, -gradient[..., None])[..., 0]
-        tried_cost, tried_gradient, tried_curvature = _around(family, seen, z + step)
-        good = tried_cost < cost
-        z = np.where(good[:, None], z + step, z)
-        gain = np.where(good, cost - tried_cost, 0.0)
-        cost = np.where(good, tried_cost, cost)
-        gradient = np.where(good[:, None], tried_gradient, gradient)
-        curvature = np.where(good[:, None, None], tried_curvature, curvature)
-        damping = np.where(good, damping / 10, damping * 10)
-        if (gain < 1e-4).all() and (np.abs(step).max() < 1e-3 or (damping > 1e6).all()):
-            break
-    return z, -0.5 * (cost + np.linalg.slogdet(curvature)[1]), np.linalg.inv(curvature)
-
-
-def _around(
-    family: Family, seen: _Seen, z: Float[np.ndarray, "cases numbers"]
-) -> tuple[Float[np.ndarray, " cases"], Float[np.ndarray, "cases numbers"], Float[np.ndarray, "cases numbers numbers"]]:
-    """Cost r'r + z'z, half its gradient, and the curvature I + J'J."""
-    pose, slope = family.predict(family.mean + np.einsum("cij,cj->ci", family.root, z))
-    miss, steep = seen.miss(pose), seen.steep(slope) @ family.root
-    across = np.swapaxes(steep, 1, 2)
-    gradient = z - np.einsum("cki,ci->ck", across, miss)
-    return (miss**2).sum(1) + (z**2).sum(1), gradient, np.eye(z.shape[1]) + across @ steep
 
 
 def _joint_changed(

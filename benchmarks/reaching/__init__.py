@@ -1,0 +1,1 @@
+"""Reaching: damage survived, errors foretold."""
