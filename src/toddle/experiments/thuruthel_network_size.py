@@ -34,13 +34,13 @@ class Parameters:
     """
 
     arm: thuruthel.Parameters
-    hidden: tuple[int, ...] = (2, 5, 10, 15, 20, 25, 30, 40)
+    hidden: tuple[int, ...] = (2, 5, 10, 15, 20, 25, 30)
     samples: tuple[int, ...] = (125, 250, 500, 1000, 2000, 4000, 8000, 16000)
-    seeds: int = 5
+    seeds: int = 3
 
 
 FULL = Parameters(thuruthel.FULL)
-QUICK = Parameters(thuruthel.QUICK, hidden=(5, 10, 20, 30), samples=(250, 1000, 3000), seeds=2)
+QUICK = Parameters(thuruthel.QUICK, hidden=(5, 10, 20, 30), samples=(250, 1000, 2000, 4000), seeds=2)
 
 
 def run(task: Task) -> Outcome:
