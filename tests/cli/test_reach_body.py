@@ -36,6 +36,7 @@ def reach(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) ->
     def call(*words: object) -> tuple[int, str, str]:
         code = main(["reach", *map(str, words)])
         said = capfd.readouterr()
+        assert code != 1, said.err
         return code, said.out, said.err
 
     return call
@@ -178,7 +179,7 @@ def test_recorded_movements_correct_a_description(reach, tmp_path):
         (("nicu", "--noise", "1"), "--noise: '1' is no length or angle"),
         (("nicu", "--noise", "1mm", "2mm"), "given twice"),
         (("nicu", "--noise", "-1mm"), "out of range"),
-        (("nicu", "--method", "screwz"), "did you mean"),
+        (("nicu", "--method", "screwz"), "known: "),
         (("nicu", "--samples", "5"), "movements"),
         (("nicu", "--damage", "lock:knee@500"), "knee"),
         (("nicu", "--damage", "lock:elbow_y@20"), "still being learned"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -145,7 +146,7 @@ def _resume(asked: Reach) -> int:
     """Go on in a folder, with whichever kind of learning left it."""
     from toddle.cli.reach_body import MOVEMENTS
 
-    if asked.resume is not None and (asked.resume / f"{MOVEMENTS}.json").exists():
+    if asked.resume is not None and os.path.lexists(asked.resume / f"{MOVEMENTS}.json"):
         from toddle.cli.reach_body import resume
 
         return resume(asked, asked.resume)

@@ -77,7 +77,13 @@ def resume(asked: Reach, folder: Path) -> int:
 
 
 def how_it_moves(asked: Reach) -> dict[str, Any]:
-    """What moves, in the form that a run remembers."""
+    """What moves, in the form that a run remembers.
+
+    Raises:
+        BadInput: noise is asked for where nothing is sensed.
+    """
+    if asked.noise is not None and asked.plant != "physics":
+        raise BadInput("only physics has sensor noise here", where="--noise", remedy="add --plant physics")
     return {
         "plant": asked.plant or "kinematics",
         "noise": None if asked.noise is None else metres(asked.noise, "--noise"),

@@ -151,13 +151,14 @@ def _run(
     def tell(news: str) -> None:
         print(f"{source.spec}: {news}", file=sys.stderr)
 
-    tell(to_do.why)
     if isinstance(robot, Body):  # its movements cost nothing: no folder before they are known to be worth one
         experience, stopped = gather(robot, to_do.q, to_do.sight, config.seed), False
+        tell(to_do.why)
         skill = skill_from(experience, to_do, source, tell)
         folder = new_folder(out, source.spec) if made is None else out or Path()
         save_movements(folder, experience, to_do.config, facts, robot)
     else:
+        tell(to_do.why)
         folder = new_folder(out, source.spec) if made is None else out or Path()
         experience, stopped = _move(robot, to_do, made, folder, facts)
         skill = skill_from(experience, to_do, source, tell)

@@ -7,7 +7,7 @@ import re
 
 from toddle.failures import BadInput
 
-_QUANTITY = re.compile(r"([+-]?\d+(?:\.\d+)?(?:e-?\d+)?)(mm|cm|m|mrad|rad|deg)")
+_QUANTITY = re.compile(r"([+-]?\d+(?:\.\d+)?)(mm|cm|m|mrad|rad|deg)")
 _METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 _MOST = 1.0  # [m], [rad]
 _RADIANS = {"mrad": 1e-3, "rad": 1.0, "deg": math.pi / 180}

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,16 +14,21 @@ from toddle.outside.files import make_folder, read_record, write_record
 from toddle.outside.records import Tensors, put_together, taken_apart
 from toddle.reach.body_config import BodyConfig
 from toddle.reach.body_skill import BodySkill
+from toddle.reach.model.curvature import Curvature
+from toddle.reach.model.curvature_chain import Shape
+from toddle.reach.model.model import Fit
+from toddle.reach.model.rigid import Rigid
 from toddle.robots.body import Body, Plant, Resumable
+from toddle.robots.catalogue import Choice
+from toddle.robots.linkage import Linkage
 from toddle.signals import Experience
 
 BODY = "body"
 _RUN, _AGAIN = "movements", "learn it again"
-_CLASSES = {
-    "BodySkill": "reach.body_skill", "BodyConfig": "reach.body_config", "Choice": "robots.catalogue",
-    "Experience": "signals", "Fit": "reach.model.model", "Linkage": "robots.linkage", "Rigid": "reach.model.rigid",
-}  # fmt: skip
-"""What a skill's files may name, and where it is defined: nothing else is ever made of them."""
+_CLASSES: dict[str, type] = {
+    kind.__name__: kind for kind in (BodyConfig, BodySkill, Choice, Curvature, Experience, Fit, Linkage, Rigid, Shape)
+}
+"""What a skill's files may name: nothing else is ever made of them."""
 
 
 def save_body(skill: BodySkill, folder: Path) -> Path:
@@ -45,7 +49,7 @@ def body_from(facts: Mapping[str, Any], tensors: Mapping[str, np.ndarray]) -> Bo
     Raises:
         LookupError, TypeError, ValueError: it is none of this version.
     """
-    skill = put_together(facts[BODY], tensors, _Classes())
+    skill = put_together(facts[BODY], tensors, _CLASSES)
     if not isinstance(skill, BodySkill):
         raise ValueError(f"it holds a {type(skill).__name__}")
     count = len(skill.joints)
@@ -84,20 +88,7 @@ def read_movements_made(folder: Path) -> tuple[Experience, BodyConfig, dict[str,
     """
     facts, tensors = read_record(folder, _RUN, _RUN)
     try:
-        experience, config, state = put_together(facts["made"], tensors, _Classes())
+        experience, config, state = put_together(facts["made"], tensors, _CLASSES)
         return experience, replace(config), dict(facts["source"]), state
     except (LookupError, TypeError, ValueError, BadInput) as fault:
         raise BadInput(f"it is not a run of this version ({fault})", where=str(folder), remedy=_AGAIN) from fault
-
-
-class _Classes(Mapping[str, type]):
-    """The classes by name, each imported when a file names it."""
-
-    def __getitem__(self, name: str) -> type:
-        return getattr(importlib.import_module(f"toddle.{_CLASSES[name]}"), name)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(_CLASSES)
-
-    def __len__(self) -> int:
-        return len(_CLASSES)

@@ -53,5 +53,8 @@ class BodyConfig:
 
 
 def _whole(name: str, value: int, least: int, most: int) -> None:
-    if not isinstance(value, int) or not least <= value <= most:
-        raise BadInput(f"{value!r} is out of range", where=f"--{name}", remedy=f"give {least} to {most}")
+    remedy = f"give {least} to {most}"
+    if not isinstance(value, int):
+        raise BadInput(f"{value!r} is no whole number", where=f"--{name}", remedy=remedy)
+    if not least <= value <= most:
+        raise BadInput(f"{value} is out of range", where=f"--{name}", remedy=remedy)

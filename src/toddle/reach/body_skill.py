@@ -12,7 +12,6 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from toddle.failures import BadInput
 from toddle.reach.body_config import BodyConfig
@@ -31,6 +30,7 @@ _AT_LIMIT = 1e-6  # a joint closer to its limit than this share of its range sta
 _FARTHEST = 1e6  # [m]
 _COARSE = 0.05  # what nobody would call reached, however coarse the model [m]
 _SEEN = 0.005  # error up to which a target counts as reached where somebody looks [m]
+Numbers = Sequence[float] | np.ndarray
 _UNIT = 1e-3  # by which a quaternion's length may differ from one
 
 
@@ -63,7 +63,7 @@ class BodySkill:
     fit: Fit
     experience: Experience
     targets: Float[np.ndarray, "points space"]
-    errors: Float[np.ndarray, " points"]
+    errors: Float[np.ndarray, " tested"]
     figures: Mapping[str, object]
 
     @cached_property
@@ -107,10 +107,10 @@ class BodySkill:
 
 def solve_body(
     skill: BodySkill,
-    target: ArrayLike,
+    target: Numbers,
     *,
-    orientation: ArrayLike | None = None,
-    near: ArrayLike | None = None,
+    orientation: Numbers | None = None,
+    near: Numbers | None = None,
     choice: Posture | None = None,
     robot: Body | Plant | None = None,
     looks: int = 3,
@@ -137,11 +137,11 @@ def solve_body(
 
 def solutions(
     skill: BodySkill,
-    target: ArrayLike,
+    target: Numbers,
     count: int,
     *,
-    orientation: ArrayLike | None = None,
-    near: ArrayLike | None = None,
+    orientation: Numbers | None = None,
+    near: Numbers | None = None,
 ) -> tuple[Solution, ...]:
     """Several clearly different postures that bring the tip to a target, the nearest to the present one first.
 
@@ -212,7 +212,7 @@ def at_limits(skill: BodySkill, q: Float[np.ndarray, " joints"]) -> str:
     return ", ".join(name for name, at in zip(skill.joints, stands, strict=True) if at)
 
 
-def posture_of(skill: BodySkill, near: ArrayLike) -> Float[np.ndarray, " joints"]:
+def posture_of(skill: BodySkill, near: Numbers) -> Float[np.ndarray, " joints"]:
     """A posture that was given, within the limits [rad or m].
 
     Raises:
@@ -228,7 +228,7 @@ def posture_of(skill: BodySkill, near: ArrayLike) -> Float[np.ndarray, " joints"
     return np.clip(q, skill.lower, skill.upper)
 
 
-def _aim(skill: BodySkill, target: ArrayLike) -> Float[np.ndarray, " space"]:
+def _aim(skill: BodySkill, target: Numbers) -> Float[np.ndarray, " space"]:
     try:
         aim = np.asarray(target, float)
     except (TypeError, ValueError):
@@ -242,7 +242,7 @@ def _aim(skill: BodySkill, target: ArrayLike) -> Float[np.ndarray, " space"]:
     return aim
 
 
-def _turn(skill: BodySkill, orientation: ArrayLike | None) -> Float[np.ndarray, "3 3"] | None:
+def _turn(skill: BodySkill, orientation: Numbers | None) -> Float[np.ndarray, "3 3"] | None:
     if orientation is None:
         return None
     if not skill.turned:

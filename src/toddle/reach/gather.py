@@ -21,6 +21,7 @@ from toddle.robots.chain import Chain
 from toddle.robots.linkage import linkage_of, poses
 from toddle.signals import Experience
 
+_STILL = 1e-9  # [m]
 _POSTURES, _NOISE = 1, 2  # streams of randomness
 
 
@@ -75,16 +76,16 @@ def gather(
         seed: of the noise.
 
     Raises:
-        BadInput: the orientation is asked for and can't be seen.
+        BadInput: the orientation is asked for and can't be seen, or the tip isn't a position in the plane or in space.
     """
     if not isinstance(body, Body):
-        return _moved(body, q, sight.turned)
+        return _checked(body, _moved(body, q, sight.turned))
     x, turn = truth(body, q, turned=sight.turned)
     noise = np.random.default_rng([seed, _NOISE]).normal(size=(len(q), 6))
     x = x + sight.noise * noise[:, : x.shape[1]]
     if turn is not None:
         turn = turn @ twist_motion(sight.angle_noise * noise * [0, 0, 0, 1, 1, 1])[:, :3, :3]
-    return Experience(q, x, turn)
+    return _checked(body, Experience(q, x, turn))
 
 
 def together(first: Experience, more: Experience) -> Experience:
@@ -107,6 +108,17 @@ def truth(
         raise BadInput("its orientation isn't known", where=body.name, remedy="leave --pose out")
     seen = _poses(pose_of, q)
     return seen[:, :3, 3], seen[:, :3, :3]
+
+
+def _checked(body: Body | Plant, seen: Experience) -> Experience:
+    """What was seen, where it can be learned from."""
+    if seen.x.shape[1] not in (2, 3):
+        raise BadInput(f"its tip has {seen.x.shape[1]} coordinates", where=body.name, remedy="it takes 2 or 3")
+    if not np.all(np.isfinite(seen.x)):
+        raise BadInput("its tip is not at a finite position", where=body.name, remedy="check its description")
+    if len(seen.x) > 1 and np.ptp(seen.x, axis=0).max() < _STILL:
+        raise BadInput("no joint moves the tip", where=body.name, remedy="name another tip")
+    return seen
 
 
 def _poses(pose: Callable, q: Float[np.ndarray, "movements joints"]) -> Float[np.ndarray, "movements 4 4"]:
