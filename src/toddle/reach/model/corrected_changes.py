@@ -4,7 +4,8 @@ From tip positions alone some changes can't be told from others: a zero that is 
 joint, just as a link does that sits across by the same amount. With zeros held to be far less certain than links, what
 zeros can explain is put down to zeros. So the numbers are reported as unlimited movements without noise would settle
 them, ``P numbers`` with ``P = (F'F + I)^-1 F'F``, ``F`` the slope over the workspace in units of the belief's widths;
-``diag P`` is the share of each number that shows at all, and ``P C P'`` its uncertainty.
+``diag P`` is the share of each number that shows at all, and ``P C P'`` its uncertainty. Gains, which nothing else
+imitates, are reported as they are.
 """
 
 from __future__ import annotations
@@ -82,8 +83,8 @@ def changes_of(
                 shift_sd=sd[at : at + 3],
                 tilt=float(np.linalg.norm(numbers[tilted])),
                 tilt_sd=float(np.linalg.norm(sd[tilted])),
-                gain=float(1 + numbers[at + 6]),
-                gain_sd=float(sd[at + 6]),
+                gain=float(1 + found.numbers[at + 6]),
+                gain_sd=float(np.sqrt(found.covariance[at + 6, at + 6])),
                 flipped=bool(start.flipped[name]),
             )
         )
