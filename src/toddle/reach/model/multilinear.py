@@ -21,6 +21,7 @@ from toddle.signals import Experience
 
 MOST = 3**7  # coefficients an axis: seven turning joints
 _TRIED = 3**5  # up to here it is affordable to try each joint either way
+_EXACT = 1e-16  # [m^2]: misses that are rounding
 _LEAST, _GREATEST = -26.0, 0.0  # ridge: powers of ten of the largest eigenvalue
 
 
@@ -100,7 +101,7 @@ def fit_multilinear(
     while slides is None and 3 ** len(lower) <= _TRIED:
         others = [_regress(experience, middle, sliding ^ (np.arange(len(lower)) == i)) for i in range(len(lower))]
         better = min(others, key=lambda other: other.surprise)
-        if better.surprise >= best.surprise:
+        if better.surprise >= best.surprise or not _clearly_less(better, best):
             break
         sliding, best = better.model.slides, better
     miss = np.linalg.norm(experience.x - best.model.forward(experience.q), axis=1)
@@ -120,6 +121,11 @@ def features(
 class _Regression(NamedTuple):
     surprise: float  # negative log evidence, up to a constant
     model: Multilinear
+
+
+def _clearly_less(one: _Regression, other: _Regression) -> bool:
+    """Whether one misses less; a joint that doesn't move the tip is simpler as a slide, and turns nevertheless."""
+    return bool(np.trace(one.model.noise) + _EXACT < 0.8 * (np.trace(other.model.noise) + _EXACT))
 
 
 def _regress(

@@ -178,7 +178,8 @@ def correct(
         missed = _missed(known)
         there = _mended(missed, model, solver, targets, answers[-1].q, lower, upper)
         answers.append(_judged(missed, model, targets, np.concatenate([known.q, there[:, None]], axis=1)))
-    return Course(*(np.stack(values) for values in zip(*answers, strict=True)), known)
+    q_all, expected, ninety = (np.stack(values) for values in zip(*answers, strict=True))
+    return Course(q_all, expected, ninety, known)
 
 
 class _Answer(NamedTuple):
