@@ -33,9 +33,9 @@ class Arms(NamedTuple):
     tip: Float[np.ndarray, "arms 4 4"]
     motor: Int[np.ndarray, "arms axes"]
 
-    def pick(self, which: int | np.ndarray | list[int] | slice) -> Arms:
+    def pick(self, which: int | Int[np.ndarray, " some"]) -> Arms:
         """Some of the candidates."""
-        rows = [which] if isinstance(which, int | np.integer) else which
+        rows = np.array([which]) if isinstance(which, int) else which
         return Arms(self.before[rows], self.slides[rows], self.gain[rows], self.tip[rows], self.motor[rows])
 
 

@@ -15,11 +15,14 @@ from toddle.reach.model.rigid import PER_AXIS, number_slopes
 from toddle.reach.model.screw_arms import Arms
 from toddle.reach.model.screw_start import robust_sigma
 from toddle.reach.model.screw_steps import NONE, Seen, descend, look
-from toddle.reach.model.screw_types import free_numbers, held_numbers, sliding, suspects
+from toddle.reach.model.screw_types import free_numbers, held_numbers, idling, sliding, suspects, travel
 from toddle.robots.linkage import Linkage
 
 _QUANTILE = {1: 15.14, 2: 18.42, 3: 21.11, 5: 25.74, 6: 27.86}  # of chi-square, one in ten thousand above
-_EXACT = 1e-10  # of the spread of the tips: what computing alone may miss by
+_EXACT = 1e-7  # of the spread of the tips: what rounded numbers alone may miss by
+
+
+_STILL = 3.0  # standard deviations: an axis that moves the tip by less says nothing of itself
 
 
 class Final(NamedTuple):
@@ -51,7 +54,12 @@ def finished(arms: Arms, gains: Bool[np.ndarray, " axes"], seen: Seen) -> Final:
     wild = _wild(square[0], float(robust_sigma(square, rows)[0]) + floor, rows)
     final = _settled(arms, gains, seen, wild, rows)
     for axis in np.flatnonzero(suspects(final.arms, np.ptp(seen.q, axis=0))[0]):
-        slid = sliding(final.arms, np.arange(len(gains)) == axis)
+        slid = _unit(sliding(final.arms, np.arange(len(gains)) == axis), final.gains)
+        if travel(final.arms, np.ptp(seen.q, axis=0))[0, axis] < _STILL * final.sigma + floor:
+            idle = idling(final.arms, np.arange(len(gains)) == axis)
+            kept = final.gains & (np.arange(len(gains)) != axis)
+            final = _simpler(final, _settled(idle, kept, seen, final.wild, rows), seen, rows)
+            continue
         final = _simpler(final, _settled(slid, final.gains, seen, final.wild, rows), seen, rows)
     for which in _gains_to_try(final, seen):
         final = _simpler(final, _settled(_unit(final.arms, which), which, seen, final.wild, rows), seen, rows)

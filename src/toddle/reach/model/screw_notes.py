@@ -25,7 +25,7 @@ def notes_of(
     motor, slides, gain = final.arms.motor[0], final.arms.slides[0], final.arms.gain[0]
     notes = [f"joint {joints[motor[axis]]} slides" for axis in np.flatnonzero(slides)]
     drives = np.bincount(motor, minlength=len(joints))
-    notes += [f"motor {joints[joint]} drives {_count(drives[joint])} axes" for joint in np.flatnonzero(drives > 1)]
+    notes += [f"motor {joints[joint]} drives {_count(int(drives[joint]))} axes" for joint in np.flatnonzero(drives > 1)]
     for axis in np.flatnonzero(final.gains & (drives[motor] == 1)):
         does = "slides" if slides[axis] else "turns"
         notes.append(f"encoder of {joints[motor[axis]]} {does} {abs(gain[axis]):.3g} times as far as it says")
@@ -42,7 +42,7 @@ def notes_of(
 
 
 def _count(axes: int) -> str:
-    return {2: "two", 3: "three"}.get(int(axes), str(axes))
+    return {2: "two", 3: "three"}.get(axes, str(axes))
 
 
 def _idle(final: Final, seen: Seen) -> list[int]:

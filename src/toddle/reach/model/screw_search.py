@@ -14,15 +14,18 @@ from toddle.reach.model.screw_mimic import with_followers
 from toddle.reach.model.screw_plane import plane_arms
 from toddle.reach.model.screw_start import lack_of_fit, random_arms, robust_sigma
 from toddle.reach.model.screw_steps import NONE, Seen, descend, look
-from toddle.reach.model.screw_types import free_numbers, held_numbers, sliding, suspects
+from toddle.reach.model.screw_types import free_numbers, held_numbers, idling, sliding, suspects, travel
 
 _STARTS = 16
 _SUBSET = 150  # movements that starts are tried on
 _ROUNDS = 2
 _CLOSE = 0.012  # of the spread of the tips: an arm that misses by more is not taken while there are starts left
+_NEAR = 0.03  # of the spread of the tips: worth more steps
 _CHANCE = 4.0  # standard deviations of the test of fit
 _WILD = 4.6  # standard deviations of a coordinate: three coordinates miss by more once in ten thousand times
+_STILL = 3.0  # standard deviations: an axis that moves the tip by less says nothing of itself
 _MOST_WILD = 0.15
+_EXACT = 1e-6  # of the spread of the tips: no noise to speak of, but that of rounded numbers
 _UNIT = 0.1  # a gain that a few movements show nearer to 1 than this may be 1
 
 
@@ -82,10 +85,10 @@ def _proposals(task: _Task) -> Iterator[Candidate]:
     for turn in range(_ROUNDS):
         yield tried(_starts(task, gains=False), np.zeros(joints, bool), task)[0]
         turning = tried(_starts(task, gains=True), np.ones(joints, bool), task)
-        yield turning[0]
         if task.slides is None:
             for candidate in turning[:3]:
                 yield from _with_slides(candidate, task)
+        yield turning[0]
         if turn == 0 and (shown is None or not doubtful(shown.miss).any()):
             yield from _with_followers(shown, task)
 
@@ -115,7 +118,12 @@ def _near_unit(shown: Isolated) -> Bool[np.ndarray, " joints"]:
 
 def _with_slides(candidate: Candidate, task: _Task) -> Iterator[Candidate]:
     """The same arm with its suspects put as sliding, all together and one by one, with gains free and not."""
-    suspected = suspects(candidate.arms, np.ptp(task.seen.q, axis=0))[0]
+    span = np.ptp(task.seen.q, axis=0)
+    idle = travel(candidate.arms, span)[0] < _STILL * candidate.sigma + _EXACT * task.seen.x.std()
+    if idle.any():
+        candidate = tried(idling(candidate.arms, idle), candidate.gains & ~idle, task)[0]
+        yield candidate
+    suspected = suspects(candidate.arms, span)[0]
     if not suspected.any():
         return
     for choice in [suspected, *(np.eye(len(suspected), dtype=bool)[suspected] if suspected.sum() > 1 else [])]:
@@ -140,6 +148,8 @@ def tried(arms: Arms, gains: Bool[np.ndarray, "*arms axes"], task: _Task) -> lis
     held = held_numbers(arms, free, task.seen.rows, gains)
     arms = descend(arms, task.few, free, steps=60, held=held)[0]
     found = judged(arms, gains, task)
+    if not found[0].fits and found[0].sigma < _NEAR * task.seen.x.std():
+        found = [*_followed(found[0], task), *found[1:]]
     if found[0].fits:
         return found
     floor = 1e-12 * task.seen.x.std()
@@ -148,6 +158,14 @@ def tried(arms: Arms, gains: Bool[np.ndarray, "*arms axes"], task: _Task) -> lis
         scale = 5 * robust_sigma(square, task.seen.rows) + floor
         arms, _, square = descend(arms, task.few, free, steps=8, held=held, scale=scale)
     return judged(arms, gains, task)
+
+
+def _followed(candidate: Candidate, task: _Task) -> list[Candidate]:
+    """A promising candidate after more steps, on all movements."""
+    arms, gains = candidate.arms, candidate.gains[None]
+    free = free_numbers(gains.shape[1], task.seen.rows, gains=bool(gains.any()))
+    held = held_numbers(arms, free, task.seen.rows, gains)
+    return judged(descend(arms, task.seen, free, steps=100, held=held, tolerance=1e-6)[0], gains, task)
 
 
 def judged(arms: Arms, gains: Bool[np.ndarray, "arms axes"], task: _Task) -> list[Candidate]:
@@ -159,14 +177,14 @@ def judged(arms: Arms, gains: Bool[np.ndarray, "arms axes"], task: _Task) -> lis
     found = []
     for rank, which in enumerate(order):
         fits = rank < 2 and explains(square.miss[which], seen, float(sigma[which]), task.rng)
-        found.append(Candidate(arms.pick(which), gains[which], float(sigma[which]), fits))
+        found.append(Candidate(arms.pick(int(which)), gains[which], float(sigma[which]), fits))
     return found
 
 
 def explains(miss: Float[np.ndarray, "rows movements"], seen: Seen, sigma: float, rng: np.random.Generator) -> bool:
     """Whether misses are small, few of them wild, and the joints don't foretell them."""
     spread = float(seen.x.std())
-    if sigma < 1e-9 * spread:
+    if sigma < _EXACT * spread:
         return True
     if sigma > _CLOSE * spread:
         return False

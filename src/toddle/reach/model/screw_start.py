@@ -32,7 +32,7 @@ def random_arms(
 
 def robust_sigma(square: Float[np.ndarray, "*arms movements"], rows: int) -> Float[np.ndarray, "*arms"]:
     """Standard deviation of each row's miss [m], from the median of the squared misses."""
-    return np.sqrt(np.median(square, axis=-1) / _CHI_MEDIAN[rows])
+    return np.asarray(np.sqrt(np.median(square, axis=-1) / _CHI_MEDIAN[rows]))
 
 
 def lack_of_fit(

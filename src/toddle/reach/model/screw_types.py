@@ -46,7 +46,7 @@ def held_numbers(
     return held
 
 
-def sliding(arms: Arms, which: Bool[np.ndarray, " axes"]) -> Arms:
+def sliding(arms: Arms, which: Bool[np.ndarray, "*arms axes"]) -> Arms:
     """The same arms with some turning axes put as sliding ones, along the way that their tips take."""
     along, through, tip = lines_of(arms)
     ways = arms.gain[..., None] * np.cross(along, tip[:, None] - through)
@@ -61,3 +61,19 @@ def sliding(arms: Arms, which: Bool[np.ndarray, " axes"]) -> Arms:
 def suspects(arms: Arms, span: Float[np.ndarray, " joints"]) -> Bool[np.ndarray, "arms axes"]:
     """Axes that turn by so little that they may slide."""
     return (arms.slides == 0) & (np.abs(arms.gain) * span[arms.motor] < _SMALL_TURN)
+
+
+def travel(arms: Arms, span: Float[np.ndarray, " joints"]) -> Float[np.ndarray, "arms axes"]:
+    """How far each axis moves the tip over its joint's range, about [m]; infinite for an axis that is not in doubt."""
+    along, through, tip = lines_of(arms)
+    lever = np.linalg.norm(np.cross(along, tip[:, None] - through), axis=-1)
+    moved = np.abs(arms.gain) * span[arms.motor] * np.where(arms.slides > 0, 1.0, lever)
+    return np.where(suspects(arms, span) | (arms.slides > 0), moved, np.inf)
+
+
+def idling(arms: Arms, which: Bool[np.ndarray, "*arms axes"]) -> Arms:
+    """The same arms with some axes turning about the tip itself, as far as their encoders say."""
+    along, through, tip = lines_of(arms)
+    through = np.where(which[..., None], tip[:, None], through)
+    idle = from_lines(along, through, np.where(which, 0.0, arms.slides), tip, arms.motor)
+    return idle._replace(gain=np.where(which, 1.0, arms.gain))
