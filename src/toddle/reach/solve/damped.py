@@ -26,7 +26,7 @@ from toddle.signals import Verdict
 
 Choice = Literal["first", "nearest", "central"]
 RADIAN = 0.3  # what an angle of a radian counts for [m]
-_WANTED: dict[Choice, int] = {"first": 1, "nearest": 8, "central": 8}  # solutions to compare
+_COMPARED = {"first": (1, 0.0), "nearest": (8, 3.0), "central": (8, 3.0)}  # solutions; pull on their starts [m^2]
 _ENDS = 16  # of the starts that failed, how many are brought to their minimum
 _THOROUGH = 40  # and where nothing but the nearest is asked for
 _MANY = 60  # solutions among which distinct ones are chosen
@@ -95,7 +95,7 @@ class DampedSolver:
         for first in range(0, len(aims), _BLOCK):
             part = slice(first, first + _BLOCK)
             present = nears if nears is None or len(nears) == 1 else nears[part]
-            ends = self._search(aims[part], rows, present, _ENDS, _WANTED[choice])
+            ends = self._search(aims[part], rows, present, _ENDS, *_COMPARED[choice])
             found[part] = self._chosen(ends, aims[part], rows, present, choice)
         q = found[:, :-3]
         held = (q <= self.lower) | (q >= self.upper)
@@ -115,7 +115,7 @@ class DampedSolver:
         """
         aim = self._aim(target, turn)
         rows, nears = 3 if turn is None else 6, None if near is None else self._nears(near, 1)
-        found = self._search(aim, rows, nears, _ENDS, _WANTED[choice])
+        found = self._search(aim, rows, nears, _ENDS, *_COMPARED[choice])
         row = found[0, 0]
         if choice != "first" or row[-1] != REACHED:
             row = self._chosen(found, aim, rows, nears, choice)[0]
@@ -193,12 +193,15 @@ class DampedSolver:
             best[lost] = settled(self.arm, aims[lost], rows, found[lost])
         return best
 
-    def _search(self, aims: np.ndarray, rows: int, nears: np.ndarray | None, ends: int, wanted: int = 1) -> np.ndarray:
+    def _search(
+        self, aims: np.ndarray, rows: int, nears: np.ndarray | None, ends: int, wanted: int = 1, pull: float = 0.0
+    ) -> np.ndarray:
         """(batch, ends, joints + 3) what the kernel finds."""
         arm = self.arm
         found = np.empty((len(aims), ends, arm.joints.shape[1] + 3))
         first = 0 if nears is None else -1
-        search(arm, aims, rows, arm.joints[3:4] if nears is None else nears, first, self.tries, wanted, found)
+        tries = max(self.tries, 4 * wanted)
+        search(arm, aims, rows, arm.joints[3:4] if nears is None else nears, first, tries, wanted, pull, found)
         if found[0, 0, -1] == REFUSED or (len(aims) > 1 and (found[:, 0, -1] == REFUSED).any()):
             raise BadInput(
                 f"target {np.argmax(found[:, 0, -1] == REFUSED)} isn't finite, 1000 km away, or turned by no rotation",
@@ -280,7 +283,7 @@ def damped_solver(
     if not (lower < upper).all():
         joint = int(np.argmax(~(lower < upper)))
         raise BadInput(f"joint {joint} has no range: {lower[joint]} to {upper[joint]}", remedy="leave out fixed joints")
-    starts = lower + (upper - lower) * np.random.default_rng(seed).random((max(postures, tries, _MANY), len(lower)))
+    starts = lower + (upper - lower) * np.random.default_rng(seed).random((max(postures, tries, 4 * _MANY), len(lower)))
     places = poses(linkage, starts)
     weight = np.array([*(float(axis in coordinates) for axis in range(3)), RADIAN, RADIAN, RADIAN])
     constants = np.concatenate([linkage.before, linkage.tip[None]])[:, :3].reshape(-1, 12)

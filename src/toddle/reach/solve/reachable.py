@@ -70,7 +70,7 @@ def judged(arm: Arm, aim: Float[np.ndarray, " 12"], rows: int, nearest: Float[np
         opened = arm.joints.copy()
         opened[:2] = lower - room, upper + room
         found = np.empty((1, 1, len(nearest) + 3))
-        search(arm._replace(joints=opened), aim[None], rows, nearest[None], -1, 0, 1, found)
+        search(arm._replace(joints=opened), aim[None], rows, nearest[None], -1, 0, 1, 0.0, found)
         q = found[0, 0, :-3]
         beyond = np.nonzero((q < lower) | (q > upper))[0]
         if found[0, 0, -1] == REACHED:

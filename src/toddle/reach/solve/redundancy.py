@@ -40,7 +40,7 @@ def draw_near(
     for pull in _PULLS:
         settle(arm, goals, rows, wanted, pull, slid)
     exact = np.empty((len(target), 1, n + 3))
-    search(arm, goals, rows, np.ascontiguousarray(slid[:, :n]), -1, 0, 1, exact)
+    search(arm, goals, rows, np.ascontiguousarray(slid[:, :n]), -1, 0, 1, 0.0, exact)
     before, after = apart(arm, turned, wanted), apart(arm, exact[:, 0, :n], wanted)
     kept = (exact[:, 0, -1] == REACHED) & (after < before)
     found[target, end, :n] = turned

@@ -8,7 +8,6 @@ from numba import njit
 from toddle.reach.solve.damped_kernels import Work, descend
 
 REACHED, FAILED, UNUSED, REFUSED = 1.0, 0.0, -1.0, -2.0
-PULL = 3.0  # towards the posture to be near, where solutions are compared: of the joints' mean square [m^2]
 
 
 @njit(cache=True, error_model="numpy")
@@ -55,7 +54,7 @@ def usable(target, rows):
 
 
 @njit(cache=True, error_model="numpy")
-def search(arm, targets, rows, nears, begin, tries, wanted, found):
+def search(arm, targets, rows, nears, begin, tries, wanted, pull, found):
     """Solutions for a batch of targets, as many as wanted; beside them the best ends of the starts that failed.
 
     Args:
@@ -66,6 +65,7 @@ def search(arm, targets, rows, nears, begin, tries, wanted, found):
         begin: -1: start from ``nears`` first; 0: from stored postures only.
         tries: how many stored postures to start from, at most.
         wanted: of how many solutions to stop; not more than there are rows.
+        pull: of ``nears`` on the choice of starts, for the joints' mean square in parts of their ranges [m^2].
         found: (batch, ends, joints + 3) filled in: joint values, distance [m], angle [rad], and `REACHED`, `FAILED`,
             `UNUSED`, or in the first row `REFUSED` where the target isn't finite, is absurdly far or no rotation.
     """
@@ -80,7 +80,7 @@ def search(arm, targets, rows, nears, begin, tries, wanted, found):
         if not usable(target, rows):
             found[b, 0, n + 2] = REFUSED
             continue
-        survey(arm, target, rows, near, PULL / n if wanted > 1 else 0.0, far)
+        survey(arm, target, rows, near, pull / n, far)
         solutions = 0
         for t in range(begin, tries):
             at = least(far)
