@@ -12,21 +12,30 @@ if TYPE_CHECKING:
     from toddle.reach.body_skill import BodySkill
     from toddle.reach.model.rigid import Rigid
 
-_TYPICAL = 0.001  # noise that movements are proposed for where none was found [m]
+_LEAST_NOISE = 1e-6  # [m]
 
 
 def write_urdf(skill: BodySkill, path: Path) -> None:
-    """Write the learned body as a URDF file.
+    """Write the learned body as a URDF file; a corrected one as the user's own file with its joints moved.
 
     Raises:
         BadInput: it has no rigid links, or the file can't be written.
     """
     from toddle.outside.files import write_bytes
+    from toddle.robots.urdf_corrected import corrected_urdf
     from toddle.robots.urdf_text import urdf_text
 
     model = rigid_of(skill, "--to-urdf")
-    name = Path(skill.source.spec).stem or "learned"
-    text = urdf_text(name, skill.joints, model.linkage, skill.lower, skill.upper, model.coordinates)
+    about = f"{skill.fit.kind}, from {len(skill.experience.q)} movements; error to expect {1000 * skill.typical:.2f} mm"
+    source = skill.source
+    if skill.fit.kind == "corrected" and Path(source.spec).is_file():
+        original = Path(source.spec).read_bytes()
+        text = corrected_urdf(
+            original, source.spec, model.linkage, tip=source.tip, base=source.base, joints=source.joints, about=about
+        )
+    else:
+        name = Path(source.spec).stem or "learned"
+        text = urdf_text(name, skill.joints, model.linkage, skill.lower, skill.upper, about=about)
     write_bytes(path, text.encode())
     print(f"the body as a URDF: {path}", file=sys.stderr)
 
@@ -52,9 +61,8 @@ def propose(skill: BodySkill, count: int, *, as_json: bool) -> None:
     from toddle.reach.explore.informative import propose as most_informative
 
     model = rigid_of(skill, "--propose")
-    q = most_informative(
-        model, skill.lower, skill.upper, skill.experience.q, count, sensor=skill.fit.sensor or _TYPICAL, seed=0
-    )
+    sensor = max(skill.fit.sensor, _LEAST_NOISE)
+    q = most_informative(model, skill.lower, skill.upper, count, sensor=sensor)
     print(",".join(skill.joints), file=sys.stderr if as_json else sys.stdout)
     for row in q:
         print(",".join(f"{value:.5f}" for value in row), file=sys.stderr if as_json else sys.stdout)

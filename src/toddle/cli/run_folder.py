@@ -26,6 +26,9 @@ FILES = (
 )  # fmt: skip
 
 
+_TOLD_ELSEWHERE = ("changes", "movements", "why")
+
+
 def refuse_used(out: Path | None) -> None:
     """Refuse a folder in which a new run would write over something."""
     if out is None:
@@ -126,12 +129,13 @@ def tell_figures(skill: Skill | BodySkill, folder: Path, *, as_json: bool) -> No
         print(json.dumps(finite({**skill.figures, "folder": str(folder)})))
         return
     published = _published(skill)
+    shown = {name: value for name, value in skill.figures.items() if name not in _TOLD_ELSEWHERE}
     rows = [
-        [name.replace("_", " "), _figure(value), _figure(published[name]) if name in published else ""]
-        for name, value in skill.figures.items()
+        [name.replace("_", " "), _figure(value), *([_figure(published.get(name, ""))] if published else [])]
+        for name, value in shown.items()
     ]
     title = f"{skill.figures['robot']} after {skill.figures['samples']} movements"
-    print_table(title, ("", "this run", "document"), rows)
+    print_table(title, ("", "this run", *(["document"] if published else [])), rows)
     print(f"figures, pictures and the skill: {folder}")
     if len(skill.targets):
         middle = " ".join(f"{value:.3f}" for value in skill.targets[len(skill.targets) // 2])

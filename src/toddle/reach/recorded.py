@@ -92,7 +92,8 @@ def _corrected(
     tell: Callable[[str], None],
 ) -> Recorded:
     """The description, corrected; or the body learned from nothing where it can't be."""
-    from toddle.reach.model.corrected import correct, report
+    from toddle.reach.model.corrected import correct
+    from toddle.reach.model.corrected_changes import report
 
     nominal = linkage_of(described)
 
@@ -130,7 +131,6 @@ def _told(skill: BodySkill, fold: Callable[[Experience], Callable[[np.ndarray], 
         **error_figures("held_out_error", errors[tame]),
         "expected_error_mean_mm": 1000 * float(mean.mean()),
         "expected_error_90_mean_mm": 1000 * float(most.mean()),
-        "solved_percent": 100 * float(solver.solve(targets).solved.mean()),
         **query_figures(lambda x: solver.solve(x[None]).q[0], lambda x: solver.solve(x).q, targets),
     }
     return replace(skill, targets=targets, errors=errors[tame], figures=figures)

@@ -133,7 +133,8 @@ def suited(body: Body | Plant | None) -> tuple[tuple[str, ...], str]:
 
 def parted(experience: Experience, name: str) -> tuple[Experience, Experience | None]:
     """The movements that a structure is fitted to, and those that are held out where it needs some; the last tenth."""
-    if not structure_named(name).tests_itself:
+    structure = STRUCTURES.get(name)
+    if structure is None or not structure.tests_itself:
         return experience, None
     cut = len(experience.q) - max(10, len(experience.q) // 10)
     turn = experience.turn
