@@ -36,6 +36,10 @@ class Normal(NamedTuple):
     precision: Float[np.ndarray, "numbers numbers"]
     pull: Float[np.ndarray, " numbers"]
 
+    def times(self, factor: float) -> Normal:
+        """The quadratic times a factor."""
+        return Normal(self.precision * factor, self.pull * factor)
+
 
 def sizes_of_numbers(shape: Shape, scale: float) -> Float[np.ndarray, " numbers"]:
     """How large each number may well be, for tips that are spread over a scale [m]."""
