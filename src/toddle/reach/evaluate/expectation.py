@@ -62,7 +62,8 @@ class Expectation:
         leverage = _capped(fit.model.spread(q) / variance)
         without = np.linalg.inv(np.eye(space) - leverage)
         miss = (without @ (x - fit.model.forward(q))[..., None])[..., 0]
-        floor = variance if sensor is None else max(variance - sensor**2, 0.0)
+        free = max(x.size - float(np.trace(leverage, axis1=1, axis2=2).sum()), 1.0)
+        floor = variance if sensor is None else _excess(variance, sensor**2, free)
         return cls(fit.model, floor, variance - floor, _scale(miss, variance * without))
 
     @classmethod
@@ -130,6 +131,11 @@ def _scale(miss: Float[np.ndarray, "movements space"], covariance: Float[np.ndar
     said = _radius(covariance, np.zeros(len(miss)))[1]
     ratio = np.sort(np.linalg.norm(miss, axis=1) / said)
     return float(ratio[min(int(np.ceil(SHARE * (len(ratio) + 1))), len(ratio)) - 1])
+
+
+def _excess(variance: float, known: float, free: float) -> float:
+    """Variance beyond the known one [m^2]; what is within half a standard deviation of chance isn't counted."""
+    return variance - known if variance > known * (1 + 0.5 * np.sqrt(2 / free)) else 0.0
 
 
 def _capped(leverage: Float[np.ndarray, "movements space space"]) -> Float[np.ndarray, "movements space space"]:

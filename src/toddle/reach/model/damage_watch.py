@@ -22,7 +22,7 @@ from toddle.reach.model.model import Model
 
 JUMP = 30.0  # d^2 of a jump; by chance 1.4e-6 with three coordinates
 _SLACK = 1.5  # of d^2 for each coordinate: what chance explains, and half as much again
-_SUM = 30.0  # the cumulative sum at which a slow change is noticed
+_SUM = 40.0  # the cumulative sum at which a slow change is noticed
 _SURE = math.log(1e4)  # log odds at which damage is beyond doubt
 _CALM = 0.05  # how often a broken body moves as if it weren't
 
