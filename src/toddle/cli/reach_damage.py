@@ -74,7 +74,11 @@ def figures_of(steps: list[Step], work: Work) -> dict[str, Any]:
     noticed = next((step.movement - first + 1 for step in since if step.news), None)
     named = next((step.news for step in reversed(since) if step.news), None)
     back = next(
-        (step.movement - first + 1 for i, step in enumerate(since) if max(s.error for s in since[i : i + 10]) < _BACK),
+        (
+            step.movement - first + 1
+            for i, step in enumerate(since)
+            if step.error < _BACK and np.nanmax([s.error for s in since[i : i + 10]]) < _BACK
+        ),
         None,
     )
     return {

@@ -19,6 +19,7 @@ from toddle.reach.body_skill import BodySkill
 from toddle.reach.gather import together, truth
 from toddle.reach.model.damage_repair import Repair, repair
 from toddle.reach.model.damage_watch import Alarm, Level, Watch, look
+from toddle.reach.model.model import Model
 from toddle.reach.model.rigid import Rigid
 from toddle.reach.solve.solver import Solver, solver_of
 from toddle.robots.body import Body
@@ -31,7 +32,7 @@ from toddle.signals import Experience
 _AFTER = 60  # movements made after the last damage
 _LOOKED_BACK = 30  # movements that a repair is fitted to at most
 _TARGETS = 5  # stream of randomness
-_TRIES = 20  # targets drawn for each movement until one is within reach
+_TRIES = 5  # targets drawn for each movement, of which the first is taken that is solved
 _LEAST_NOISE = 1e-5  # [m]
 
 
@@ -56,7 +57,7 @@ class Step:
 
     Attributes:
         movement: its number, those of learning included.
-        target: where the tip was to go [m].
+        target: where the tip was to go [m]; NaN where it wasn't to reach, but to learn what happened.
         error: how far from there it truly came to be [m].
         alarm: what the watch made of it.
         news: what was noticed or understood; empty: nothing new.
@@ -73,7 +74,12 @@ class Step:
 class Adaptation(Protocol):
     """A body's picture of itself while it works: it is shown every movement, and may change its mind."""
 
+    model: Model
     solver: Solver
+
+    def wants(self) -> Float[np.ndarray, " joints"] | None:
+        """A movement that it wants to make to learn what happened [rad or m]; None: reach on."""
+        ...
 
     def show(self, q: np.ndarray, x: np.ndarray) -> tuple[Alarm, str]:
         """One more movement: what it says of the body, and what is new; empty: nothing."""
@@ -118,7 +124,8 @@ def work(skill: BodySkill, body: Body, plan: Work) -> Iterator[Step]:
     mind = adaptation_of(skill)
     rng = np.random.default_rng([config.seed, _TARGETS])
     for movement in range(count + 1, plan.movements + 1):
-        target, q = _reachable(skill, mind.solver, rng)
+        probe = mind.wants()
+        target, q = _reachable(skill, mind, rng) if probe is None else (np.full(skill.fit.model.space, np.nan), probe)
         seen = plant.move(q)
         error = float(np.linalg.norm(_true_tip(plant, body, q) - target))
         alarm, news = mind.show(q, seen)
@@ -160,6 +167,9 @@ class RigidAdaptation:
         self._since: Experience | None = None
         self._stood = skill.experience.q[-1]
         self._told = ""
+
+    def wants(self) -> None:
+        """Nothing: reaching on tells it what happened."""
 
     def show(self, q: np.ndarray, x: np.ndarray) -> tuple[Alarm, str]:
         """One more movement: what it says of the body, and what is new; empty: nothing."""
@@ -229,11 +239,10 @@ def _true_tip(plant: DamagedPlant, body: Body, q: Float[np.ndarray, " joints"]) 
 
 
 def _reachable(
-    skill: BodySkill, solver: Solver, rng: np.random.Generator
+    skill: BodySkill, mind: Adaptation, rng: np.random.Generator
 ) -> tuple[Float[np.ndarray, " space"], Float[np.ndarray, " joints"]]:
-    """A target that the body was able to reach, and can still reach by what it knows of itself now."""
-    q = rng.uniform(skill.lower, skill.upper, (_TRIES, len(skill.joints)))
-    targets = skill.fit.model.forward(q)
-    answers = solver.solve(targets)
+    """A target that the body can reach by what it knows of itself now."""
+    targets = mind.model.forward(rng.uniform(skill.lower, skill.upper, (_TRIES, len(skill.joints))))
+    answers = mind.solver.solve(targets)
     first = int(np.argmax(answers.solved))
     return targets[first], answers.q[first]
