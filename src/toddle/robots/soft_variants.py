@@ -14,6 +14,7 @@ and to how far it lies on its side).
 from __future__ import annotations
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -79,10 +80,7 @@ class SoftVariant(Body):
             beyond = arcs[i:].sum() + self.gaps[i:].sum()
             down = -turn[2, :2]  # gravity across the segment, in its foot's frame
             bend = bends[i] + self.sag[i] * beyond * down
-            for piece in range(_PIECES):
-                share = (1 + self.taper[i] * ((2 * piece + 1) / _PIECES - 1)) / _PIECES
-                step, shift = turn_and_shift(share * bend, arcs[i] / _PIECES)
-                place, turn = place + turn @ shift, turn @ step
+            turn, place = _along(turn, place, bend, arcs[i], self.taper[i])
             place = place + self.gaps[i] * turn[:, 2]
         place = place + turn @ self.offset
         return jnp.eye(4, dtype=q.dtype).at[:3, :3].set(turn).at[:3, 3].set(place)
@@ -100,6 +98,26 @@ class SoftVariant(Body):
             arcs.append(lengths[own].mean())
             first += size
         return jnp.stack(bends), jnp.stack(arcs)
+
+
+def _along(
+    turn: Float[Array, "3 3"],
+    place: Float[Array, "3"],
+    bend: Float[Array, "2"],
+    arc: Float[Array, ""],
+    taper: Float[Array, ""],
+) -> tuple[Float[Array, "3 3"], Float[Array, "3"]]:
+    """Turn and place [m] at a segment's head, from those at its foot."""
+
+    def piece(
+        carry: tuple[Float[Array, "3 3"], Float[Array, "3"]], where: Float[Array, ""]
+    ) -> tuple[tuple[Float[Array, "3 3"], Float[Array, "3"]], None]:
+        turn, place = carry
+        step, shift = turn_and_shift((1 + taper * where) / _PIECES * bend, arc / _PIECES)
+        return (turn @ step, place + turn @ shift), None
+
+    middles = (2 * jnp.arange(_PIECES, dtype=turn.dtype) + 1) / _PIECES - 1
+    return jax.lax.scan(piece, (turn, place), middles)[0]
 
 
 def bha_variant(*, taper: float = 0.0, nonlinear: float = 0.0, sag: float = 0.0, seed: int = 0) -> SoftVariant:
