@@ -36,7 +36,8 @@ class Reach:
         model: whether recorded movements correct the robot's description; --no-model learns from them alone.
         damage: the body breaks while it works: lock:JOINT@500, slip:JOINT=0.2rad@500, weaken:JOINT=0.5@500,
             bend:LINK=5cm@500 or replace:LINK=+8cm@500, the number being that of the movement.
-        propose: how many most informative movements to propose next.
+        propose: print so many movements, the most informative ones: first ones to correct a robot's description by, or
+            next ones for a skill.
         to: export the skill: a file that ends with .onnx or .jax.
         to_urdf: write the learned body as a URDF file.
         hidden: units of each hidden layer of the perceptron; 0 for none.
@@ -111,7 +112,7 @@ _OF_A_ROBOT = ("tip", "base", "joints")
 _TAKES = {  # the options that each way of calling has, beside --json
     "robot": {"method", "samples", "seed", "noise", "test_points", "plant", "out", *_OF_A_ROBOT, *OF_BABBLING,
               *_OF_A_BODY},
-    "from_": {"robot", "method", "seed", "model", "propose", "to", "to_urdf", "out", *_OF_A_ROBOT},
+    "from_": {"robot", "method", "seed", "model", "to", "to_urdf", "out", *_OF_A_ROBOT},
     "resume": {"samples"},
     "skill": {"target", "orientation", "near", "choice", "solutions", "looks", "tolerance", "plant", "noise", "to",
               "to_urdf", "propose"},

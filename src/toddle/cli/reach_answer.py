@@ -35,6 +35,10 @@ def answer(asked: Reach) -> int:
         from toddle.cli.reach_body import after
 
         after(asked, skill)
+        if asked.propose is not None:
+            from toddle.cli.reach_export import propose
+
+            propose(skill, asked.propose)
         if asked.target is None:
             return 0
         if asked.solutions is not None:

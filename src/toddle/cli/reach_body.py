@@ -45,6 +45,11 @@ def learn(asked: Reach) -> int:
     refuse_used(asked.out)
     refuse_files(asked)
     body = load_choice(source)
+    if asked.propose is not None:
+        from toddle.cli.reach_export import propose_first
+
+        propose_first(body, asked.propose)
+        return 0
     if asked.to_urdf is not None and not isinstance(body, Chain):
         raise BadInput(f"{source.spec} has no rigid links", where="--to-urdf", remedy="leave it out")
     how = {"plant": asked.plant or "kinematics", "noise": config.noise if asked.plant == "physics" else None}
@@ -181,7 +186,7 @@ def _run(
 
 
 def after(asked: Reach, skill: BodySkill) -> None:
-    """What was asked for beside learning: files of the body and of the skill, movements to make next."""
+    """What was asked for beside learning: files of the body and of the skill."""
     if asked.to_urdf is not None:
         from toddle.cli.reach_export import write_urdf
 
@@ -190,10 +195,6 @@ def after(asked: Reach, skill: BodySkill) -> None:
         from toddle.cli.reach_export import export
 
         export(skill, path)
-    if asked.propose is not None:
-        from toddle.cli.reach_export import propose
-
-        propose(skill, asked.propose, as_json=asked.json)
 
 
 def _move(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,8 +10,13 @@ from typing import TYPE_CHECKING
 from toddle.failures import BadInput
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+
     from toddle.reach.body_skill import BodySkill
     from toddle.reach.model.rigid import Rigid
+    from toddle.robots.body import Body
 
 _LEAST_NOISE = 1e-6  # [m]
 
@@ -28,14 +34,14 @@ def write_urdf(skill: BodySkill, path: Path) -> None:
     model = rigid_of(skill, "--to-urdf")
     about = f"{skill.fit.kind}, from {len(skill.experience.q)} movements; error to expect {1000 * skill.typical:.2f} mm"
     source = skill.source
-    if skill.fit.kind == "corrected" and Path(source.spec).is_file():
-        original = Path(source.spec).read_bytes()
-        text = corrected_urdf(
-            original, source.spec, model.linkage, tip=source.tip, base=source.base, joints=source.joints, about=about
-        )
-    else:
-        name = Path(source.spec).stem or "learned"
-        text = urdf_text(name, skill.joints, model.linkage, skill.lower, skill.upper, about=about)
+    name = Path(source.spec).stem or "learned"
+    text = urdf_text(name, skill.joints, model.linkage, skill.lower, skill.upper, about=about)
+    if skill.fit.kind == "corrected" and Path(source.spec).suffix == ".urdf":
+        with contextlib.suppress(BadInput):  # a chain that climbs before it descends is written as a new file
+            text = corrected_urdf(
+                Path(source.spec).read_bytes(), source.spec, model.linkage, tip=source.tip, base=source.base,
+                joints=source.joints, about=about,
+            )  # fmt: skip
     write_bytes(path, text.encode())
     print(f"the body as a URDF: {path}", file=sys.stderr)
 
@@ -52,8 +58,8 @@ def export(skill: BodySkill, path: Path) -> None:
     print(f"the skill, to be used without toddle: {path}", file=sys.stderr)
 
 
-def propose(skill: BodySkill, count: int, *, as_json: bool) -> None:
-    """Print the movements that would tell most about the body, as rows of a CSV file (not beside a JSON object).
+def propose(skill: BodySkill, count: int) -> None:
+    """Print the movements that would tell most about a learned body, as a CSV table of joint values.
 
     Raises:
         BadInput: it has no rigid links.
@@ -62,10 +68,32 @@ def propose(skill: BodySkill, count: int, *, as_json: bool) -> None:
 
     model = rigid_of(skill, "--propose")
     sensor = max(skill.fit.sensor, _LEAST_NOISE)
-    q = most_informative(model, skill.lower, skill.upper, count, sensor=sensor)
-    print(",".join(skill.joints), file=sys.stderr if as_json else sys.stdout)
+    _print_table(skill.joints, most_informative(model, skill.lower, skill.upper, count, sensor=sensor))
+
+
+def propose_first(body: Body, count: int) -> None:
+    """Print the movements that would tell most about how wrong a robot's description is, as a CSV table.
+
+    Raises:
+        BadInput: it has no rigid links.
+    """
+    import numpy as np
+
+    from toddle.reach.explore.informative import propose as most_informative
+    from toddle.reach.model.corrected import assumed
+    from toddle.robots.chain import Chain
+    from toddle.robots.linkage import linkage_of
+
+    if not isinstance(body, Chain):
+        raise BadInput(f"{body.name} has no rigid links", where="--propose", remedy="leave it out")
+    model = assumed(linkage_of(body), coordinates=body.coordinates)
+    _print_table(body.joints, most_informative(model, np.asarray(body.lower), np.asarray(body.upper), count))
+
+
+def _print_table(names: Sequence[str], q: np.ndarray) -> None:
+    print(",".join(names))
     for row in q:
-        print(",".join(f"{value:.5f}" for value in row), file=sys.stderr if as_json else sys.stdout)
+        print(",".join(f"{value:.5f}" for value in row))
 
 
 def rigid_of(skill: BodySkill, where: str) -> Rigid:

@@ -24,6 +24,7 @@ from toddle.robots.linkage import linkage_of
 from toddle.signals import Experience
 
 _FOLDS = 5
+_ENOUGH = 100  # movements from which an arm is learned from nothing rather than by a doubtful correction
 _BEYOND = 0.05  # of a joint's range: how far a recorded value may lie outside its limits
 
 
@@ -71,7 +72,10 @@ def learn_recorded(
         method=method, movements=len(experience.q), seed=seed, noise=None, pose=experience.turn is not None
     )
     if described is not None and method is None:
-        return _corrected(experience, known, described, config, source, tell)
+        found = _corrected(experience, known, described, config, source, tell)
+        if found is not None:
+            return found
+        method, config = "screws", replace(config, method="screws")
     names, why = suited(None)
     if method is not None:
         names, why = (structure_named(method).name,), "as asked for"
@@ -90,8 +94,8 @@ def _corrected(
     config: BodyConfig,
     source: Choice,
     tell: Callable[[str], None],
-) -> Recorded:
-    """The description, corrected; or the body learned from nothing where it can't be."""
+) -> Recorded | None:
+    """The description, corrected; None where it is so wrong that the movements tell more alone."""
     from toddle.reach.model.corrected import correct
     from toddle.reach.model.corrected_changes import report
 
@@ -103,6 +107,9 @@ def _corrected(
     result = corrected(experience)
     for note in result.fit.notes:
         tell(note)
+    if result.doubtful and len(experience.q) >= _ENOUGH:
+        tell("so the body is learned from nothing")
+        return None
     empty = np.empty((0, experience.x.shape[1]))
     skill = BodySkill(
         source, known.joints, known.lower, known.upper, known.home, replace(config, method="corrected"),

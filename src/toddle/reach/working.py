@@ -158,8 +158,9 @@ class RigidAdaptation:
         if not isinstance(skill.fit.model, Rigid):
             raise BadInput(f"{skill.fit.kind} is no rigid arm", remedy="learn it with --method screws")
         self._skill = skill
-        self._before = self.model = skill.fit.model
-        self.solver = skill.solver
+        self._before: Rigid = skill.fit.model
+        self.model: Model = skill.fit.model
+        self.solver: Solver = skill.solver
         self.cause: Repair | None = None
         self._wild = float(skill.fit.wild.mean())
         self._watch = Watch.start(self._wild)
@@ -184,7 +185,9 @@ class RigidAdaptation:
             return alarm, news
         if confirmed and alarm.level is Level.CONFIRMED:
             news = "the body changed again"
-            self._before, self._since, self._told, self.cause = self.model, None, "", None
+            if self.cause is not None:
+                self._before = self.cause.model
+            self._since, self._told, self.cause = None, "", None
             self._watch, alarm = look(Watch.start(self._wild), q, x, self._before, self._sensor)
         if self._since is None and not news:
             news = f"the body seems to have changed: the tip is off by {alarm.surprise**0.5:.0f} times what is usual"

@@ -91,7 +91,7 @@ def _about(skill: BodySkill) -> dict[str, object]:
         "samples": len(skill.experience.q),
         "movements": len(skill.experience.q),
         "seed": config.seed,
-        "noise_mm": 1000 * config.noise,
+        "noise_mm": 1000 * (config.noise or 0.0),
         "angle_noise_mrad": 1000 * config.angle_noise,
         "look_noise_mm": 1000 * config.look_noise,
         "noise_found_mm": 1000 * fit.sensor,
@@ -129,7 +129,9 @@ def _looks(
         x = _tips(robot, judge, q, turned=False)[0]
         return x + noise * rng.normal(size=x.shape)
 
-    course = correct(skill.fit.model, skill.solver, observe, targets, q, LOOKS, sensor=noise, lower=skill.lower, upper=skill.upper)
+    course = correct(
+        skill.fit.model, skill.solver, observe, targets, q, LOOKS, sensor=noise, lower=skill.lower, upper=skill.upper
+    )
     after = [np.linalg.norm(_tips(robot, judge, given, turned=False)[0] - targets, axis=1) for given in course.q[1:]]
     return {
         "after_looks_mean_mm": [1000 * float(errors.mean()) for errors in after],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -108,7 +108,7 @@ class ModelSolver:
         answers = self._from(np.repeat(target[None], len(starts), 0), near=starts, starts=1)
         return _apart(answers.q[answers.solved], near, self.upper - self.lower, count)
 
-    def _from(self, targets: np.ndarray, **how: object) -> Answers:
+    def _from(self, targets: np.ndarray, **how: Any) -> Answers:
         from toddle.reach.solve.gauss_newton import solve_model
 
         return solve_model(self.model, targets, self.lower, self.upper, memory=(self.known.q, self.known.x), **how)
