@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from toddle.reach.explore.isolating import isolating_movements
+from toddle.reach.explore.outward import outward_movements
 from toddle.reach.model.rigid import changed, number_slopes
 from toddle.reach.model.screw_arms import Arms, from_lines, lines_of, linkage_from, move, recentred, stepped, tidied
 from toddle.reach.model.screw_isolation import alone
@@ -122,3 +123,13 @@ def test_every_joint_moves_alone_within_its_limits() -> None:
 
 def test_random_movements_show_no_joint_alone() -> None:
     assert alone(np.random.default_rng(6).normal(size=(100, 4))) is None
+
+
+def test_outward_movements_follow_the_arcsine_law_and_full_turns_do_not() -> None:
+    lower, upper = np.array([-1.0, -3.0]), np.array([0.0, 3.0])
+    q = outward_movements(lower, upper, 400, np.random.default_rng(7))
+    assert (q >= lower).all()
+    assert (q <= upper).all()
+    np.testing.assert_allclose(np.quantile(q[:, 0], [0.25, 0.5, 0.75]), [-0.8536, -0.5, -0.1464], atol=0.01)
+    np.testing.assert_allclose(np.quantile(q[:, 1], [0.25, 0.5, 0.75]), [-1.5, 0.0, 1.5], atol=0.03)
+    assert abs(np.corrcoef(q.T)[0, 1]) < 0.15

@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-PLACES = 4
-"""Movements of each joint: three points make a circle, two more show whether it is one."""
+_PLACES = np.array([0.0, 0.29, 0.73, 1.0])
+"""Of each joint, within its range: three points make a circle, two more show whether it is one, and uneven distances
+keep an encoder from looking as if it turned some whole turns more from place to place."""
 
 LOOKS = 3
 """How often home is looked at: all joints' movements hang on it, and one look may be wild."""
@@ -27,10 +28,8 @@ def isolating_movements(
         home: where all joints but one stay [rad or m].
     """
     low, high = np.maximum(lower, home - np.pi), np.minimum(upper, home + np.pi)
-    movements = np.tile(home, (LOOKS + PLACES * len(home), 1)).astype(float)
+    movements = np.tile(home, (LOOKS + len(_PLACES) * len(home), 1)).astype(float)
     for joint in range(len(home)):
-        places = np.linspace(low[joint], high[joint], 2 * PLACES + 1)[1::2]
-        places[0], places[-1] = low[joint], high[joint]
-        first = LOOKS + PLACES * joint
-        movements[first : first + PLACES, joint] = places
+        first = LOOKS + len(_PLACES) * joint
+        movements[first : first + len(_PLACES), joint] = low[joint] + _PLACES * (high[joint] - low[joint])
     return movements

@@ -17,7 +17,8 @@ from toddle.reach.model.screw_steps import Seen, descend
 from toddle.reach.model.screw_types import free_numbers, held_numbers, sliding, suspects
 
 _STARTS = 6
-_UNUSUAL = 5.0  # times as large as the joints' median: not one axis, or a wild movement
+_UNUSUAL = 6.0  # times as large as usual: not one axis, or a wild movement
+_LARGEST_GAIN = 4.0
 _EXACT = 1e-9  # [m]
 _FEWEST = 2  # movements of a joint, besides where all stay
 
@@ -85,10 +86,10 @@ def isolated(seen: Seen, slides: Float[np.ndarray, " joints"] | None, rng: np.ra
         angles, places = np.append(q[own, joint], 0.0)[:, None], np.concatenate([x[own], tip[None]])
         paths.append(seen._replace(q=angles, x=places, turn=None))
     axes = [_axis(path, float(kind), rng) for path, kind in zip(paths, known, strict=True)]
-    usual = float(np.median([axis.miss for axis in axes]))
+    common = usual(np.array([axis.miss for axis in axes]))
     for joint, (path, kind) in enumerate(zip(paths, known, strict=True)):
-        if axes[joint].miss > _UNUSUAL * usual + _EXACT and len(path.q) > _FEWEST + 2:
-            axes[joint] = _without_one(axes[joint], path, float(kind), usual, rng)
+        if axes[joint].miss > _UNUSUAL * common + _EXACT and len(path.q) > _FEWEST + 2:
+            axes[joint] = _without_one(axes[joint], path, float(kind), common, rng)
     along, through, slides, gain, miss = (np.array(values) for values in zip(*axes, strict=True))
     return Isolated(along, through, slides, gain, miss, tip, posture)
 
@@ -108,7 +109,12 @@ def isolated_arms(found: Isolated, count: int, seen: Seen, rng: np.random.Genera
 
 def doubtful(miss: Float[np.ndarray, " joints"]) -> Bool[np.ndarray, " joints"]:
     """Joints whose own movements are explained much worse than the others'."""
-    return miss > _UNUSUAL * np.median(miss) + _EXACT
+    return miss > _UNUSUAL * usual(miss) + _EXACT
+
+
+def usual(miss: Float[np.ndarray, " joints"]) -> float:
+    """What joints miss by that have one axis and no wild movement: at least a quarter of them is so."""
+    return float(np.quantile(miss, 0.25))
 
 
 class _Axis(NamedTuple):
@@ -119,12 +125,12 @@ class _Axis(NamedTuple):
     miss: float
 
 
-def _without_one(all_of_it: _Axis, path: Seen, slides: float, usual: float, rng: np.random.Generator) -> _Axis:
+def _without_one(all_of_it: _Axis, path: Seen, slides: float, common: float, rng: np.random.Generator) -> _Axis:
     """The axis without the movement that spoils it, if one does."""
     rows = np.arange(len(path.q))
     axes = [_axis(path.some(rows != row), slides, rng) for row in rows[:-1]]
     best = min(axes, key=lambda axis: axis.miss)
-    return best if best.miss < _UNUSUAL * usual + _EXACT else all_of_it
+    return best if best.miss < _UNUSUAL * common + _EXACT else all_of_it
 
 
 def _axis(path: Seen, slides: float, rng: np.random.Generator) -> _Axis:
@@ -134,7 +140,8 @@ def _axis(path: Seen, slides: float, rng: np.random.Generator) -> _Axis:
         arms = random_arms(_STARTS, path, np.array([float(slides > 0)]), np.zeros(1, int), rng)
         free = free_numbers(1, path.rows, gains=loose)
         cost, arms = _fitted(arms, path, free, np.array([loose]))
-        arms = arms.pick(int(cost.argmin()))
+        cost = np.where(np.abs(arms.gain[:, 0]) < _LARGEST_GAIN, cost, np.inf)
+        arms, cost = arms.pick(int(cost.argmin())), cost.min(keepdims=True)
         if loose and np.isnan(slides):
             slid = sliding(arms, suspects(arms, np.ptp(path.q, axis=0)))
             more, slid = _fitted(slid, path, free, np.array([True]))

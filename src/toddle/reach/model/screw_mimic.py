@@ -17,6 +17,7 @@ from toddle.reach.model.screw_types import free_numbers, held_numbers
 
 _STARTS = 4  # of each motor and place
 _KEPT = 12
+_SUSPECTED = 2  # motors whose own movements show no second axis clearly
 
 
 def with_followers(
@@ -38,8 +39,9 @@ def with_followers(
     """
     joints = seen.q.shape[1]
     motors = np.arange(joints)
-    if shown is not None and doubtful(shown.miss).any():
-        motors = np.flatnonzero(doubtful(shown.miss))
+    if shown is not None:
+        suspected = np.argsort(-shown.miss)[:_SUSPECTED]
+        motors = np.flatnonzero(doubtful(shown.miss)) if doubtful(shown.miss).any() else suspected
     groups, second = [], []
     for motor in motors:
         for place in range(joints + 1):

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from toddle.reach.model.screw_arms import Arms
-from toddle.reach.model.screw_isolation import Isolated, doubtful, isolated, isolated_arms
+from toddle.reach.model.screw_isolation import Isolated, doubtful, isolated, isolated_arms, usual
 from toddle.reach.model.screw_mimic import with_followers
 from toddle.reach.model.screw_plane import plane_arms
 from toddle.reach.model.screw_start import lack_of_fit, random_arms, robust_sigma
@@ -23,6 +23,7 @@ _CLOSE = 0.012  # of the spread of the tips: an arm that misses by more is not t
 _NEAR = 0.03  # of the spread of the tips: worth more steps
 _CHANCE = 4.0  # standard deviations of the test of fit
 _WILD = 4.6  # standard deviations of a coordinate: three coordinates miss by more once in ten thousand times
+_MOST_FOLLOWED = 8  # joints: with more, trying every motor at every place takes too long
 _STILL = 3.0  # standard deviations: an axis that moves the tip by less says nothing of itself
 _MOST_WILD = 0.15
 _EXACT = 1e-6  # of the spread of the tips: no noise to speak of, but that of rounded numbers
@@ -77,19 +78,18 @@ def _proposals(task: _Task) -> Iterator[Candidate]:
     joints = task.seen.q.shape[1]
     shown = isolated(task.seen, task.slides, task.rng)
     if shown is not None:
-        if doubtful(shown.miss).any():
-            yield from _with_followers(shown, task)
         yield from _as_shown(shown, task)
-        for _ in range(_ROUNDS if doubtful(shown.miss).any() else 0):
+        rigid = usual(shown.miss) < _CLOSE * task.seen.x.std()  # else no joint draws a circle: more axes are no help
+        for _ in range((_ROUNDS if doubtful(shown.miss).any() else 1) if rigid else 0):
             yield from _with_followers(shown, task)
-    for turn in range(_ROUNDS):
+    for turn in range(_ROUNDS if shown is None else 1):
         yield tried(_starts(task, gains=False), np.zeros(joints, bool), task)[0]
         turning = tried(_starts(task, gains=True), np.ones(joints, bool), task)
         if task.slides is None:
             for candidate in turning[:3]:
                 yield from _with_slides(candidate, task)
         yield turning[0]
-        if turn == 0 and (shown is None or not doubtful(shown.miss).any()):
+        if turn == 0 and shown is None and joints <= _MOST_FOLLOWED:
             yield from _with_followers(shown, task)
 
 
