@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from toddle.reach.solve.damped_kernels import Work, descend
+from toddle.reach.solve.damped_kernels import KERNEL, Work, descend
 
 REACHED, FAILED, UNUSED, REFUSED = 1.0, 0.0, -1.0, -2.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def survey(arm, target, rows, near, pull, far):
     """How far each stored posture puts the tip from the target, and is from ``near``: squared [m^2], but a constant."""
     count = far.shape[0]
@@ -31,7 +31,7 @@ def survey(arm, target, rows, near, pull, far):
             far[i] += weight * (arm.postures[i, j] - value) ** 2
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def least(values):
     """Where the least value is."""
     at = 0
@@ -41,7 +41,7 @@ def least(values):
     return at
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def usable(target, rows):
     """Whether a target is finite and not absurdly far, and its turn a rotation."""
     total = abs(target[0]) + abs(target[1]) + abs(target[2])
@@ -53,7 +53,7 @@ def usable(target, rows):
     return total < 1e6
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def search(arm, targets, rows, nears, begin, tries, wanted, pull, found):
     """Solutions for a batch of targets, as many as wanted; beside them the best ends of the starts that failed.
 

@@ -13,10 +13,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from toddle.reach.solve.damped_kernels import Work, miss, place
+from toddle.reach.solve.damped_kernels import KERNEL, Work, miss, place
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def curve(arm, rows, angle, work):
     """Fill in half the squared error's Hessian (lower triangle of work.matrix[1]) and its descent, work.joint[1]."""
     columns, twist, error = work.columns, work.twist, work.task[1]
@@ -65,7 +65,7 @@ def curve(arm, rows, angle, work):
                 hessian[j, j] += 2.0 * value
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def factored(matrix, shift, right, out):
     """Solve (matrix[1] + shift) x = right by Cholesky, into out; False where that isn't positive definite."""
     hessian, factor = matrix[1], matrix[0]
@@ -95,7 +95,7 @@ def factored(matrix, shift, right, out):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def settle(arm, targets, rows, towards, pull, found):
     """Move joint values to the minima of the merit, each from where it is.
 
