@@ -20,7 +20,7 @@ from jaxtyping import Bool, Float
 from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.optimize import minimize
 
-_FEW, _MORE = 500, 1500  # movements that the weights are first sought with, and then mended with
+_FIRST, _FEW, _MORE = 200, 500, 1500  # movements that the weights are sought with, ever more of them
 _LEAST_NOISE = 1e-10  # of the variance: what keeps the covariance positive in float64
 _ROWS = 512  # postures at a time, so that the covariances stay in the cache
 
@@ -139,7 +139,8 @@ def learn_covariance(
     y, span = x - x.mean(0), np.where(upper > lower, upper - lower, 1.0)
     sides = [np.full(len(lower), side) for side in (True, False)] if turns is None else [turns]
     firsts = [Evidence(Embedding(side, np.where(side, 0.7, 1.5 / span)), 1e-4, np.inf) for side in sides]
-    found = min((_improved(first, q[:_FEW], y[:_FEW], 40) for first in firsts), key=lambda each: each.surprise)
+    first = min((_improved(first, q[:_FIRST], y[:_FIRST], 25) for first in firsts), key=lambda each: each.surprise)
+    found = _improved(first, q[:_FEW], y[:_FEW], 40)
     return _improved(found, q[:_MORE], y[:_MORE], 15) if mend and len(q) > _FEW else found
 
 

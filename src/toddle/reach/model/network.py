@@ -2,8 +2,9 @@
 
 Three hidden layers of products, h = (W z + a) * (V z + b), and a linear output (the "bilinear" gated unit of Shazeer
 2020, "GLU variants improve transformer"): a polynomial of degree eight in what goes in, cosine and sine of each joint
-that is an angle, else its value. Trained by Adam on squared error, the rate falling as a half cosine; asked in NumPy,
-so that answers need no JAX. How wrong it may be comes from movements that it was not trained on.
+that is an angle, else its value. Trained by Adam (Kingma and Ba 2015) on squared error, the rate falling as a half
+cosine; asked in NumPy, so that answers need no JAX. How wrong it may be comes from movements that it was not trained
+on.
 """
 
 from __future__ import annotations
@@ -22,7 +23,12 @@ from toddle.reach.model.model import Fit
 from toddle.signals import Experience
 
 WIDTH, _LAYERS, _BATCH, _CHUNK = 128, 3, 512, 100
-_RATE, _STEPS = 1e-2, 20_000  # these steps take about a minute; of a smaller budget the rate falls sooner
+_RATE, _B1, _B2, _STEPS = (
+    1e-2,
+    0.9,
+    0.99,
+    20_000,
+)  # of Adam
 _HELD_OUT = 1000
 
 
@@ -121,6 +127,7 @@ def fit_network(
     *,
     turns: Bool[np.ndarray, " joints"] | None = None,
     seed: int = 0,
+    steps: int = 16_000,
     seconds: float = 60.0,
     tell: Callable[[float], None] | None = None,
 ) -> Fit:
@@ -131,7 +138,8 @@ def fit_network(
         lower, upper: the joints' limits [rad or m].
         turns: joints whose value is an angle [rad]; None: all of them or none, whichever explains the movements better.
         seed: of the first weights and of the order of the movements.
-        seconds: training ends by then [s], whatever is left; a machine that is faster does the same steps always.
+        steps: of training; they take about a minute of one core.
+        seconds: training ends by then [s], its rate falling sooner. In time, the same seed gives the same network.
         tell: called with the fraction done.
 
     Raises:
@@ -147,7 +155,7 @@ def fit_network(
     mean, scale = x.mean(0), float(x.std()) or 1.0
     z, y = inputs(q, turns, middle, half), ((x - mean) / scale).astype(np.float32)
     left = seconds - (time.perf_counter() - start)
-    layers, out = _trained(z[held:], y[held:], seed, max(left, 0.1 * seconds), tell or (lambda _: None))
+    layers, out = _trained(z[held:], y[held:], seed, (steps, max(left, 0.5 * seconds)), tell or (lambda _: None))
     bare = doubt_from(evidence.embedding, evidence.noise, q[held : held + PART], x.shape[1])
     model = Network(turns, middle, half, layers, out, mean, scale, bare)
     doubt = _calibrated(bare, q[:held], x[:held] - model.forward(q[:held]))
@@ -172,15 +180,12 @@ def _trained(
     z: Float[np.ndarray, "movements inputs"],
     y: Float[np.ndarray, "movements space"],
     seed: int,
-    seconds: float,
+    budget: tuple[int, float],
     tell: Callable[[float], None],
 ) -> tuple[tuple[Layer, ...], Float[np.ndarray, "width space"]]:
     """Train the layers and the output, some hundred steps between looks at the clock."""
     import jax
     import jax.numpy as jnp
-    import optax
-
-    adam = optax.scale_by_adam(b2=0.99)
 
     def loss(weights: tuple, z: jax.Array, y: jax.Array) -> jax.Array:
         for layer in weights[0]:
@@ -188,29 +193,33 @@ def _trained(
         return jnp.mean((z @ weights[1] - y) ** 2)
 
     @jax.jit
-    def chunk(weights: tuple, state: optax.OptState, rows: jax.Array, rate: jax.Array, z: jax.Array, y: jax.Array):
-        def step(carry: tuple, some: jax.Array) -> tuple[tuple, None]:
-            weights, state = carry
+    def chunk(state: tuple, rows: jax.Array, rate: jax.Array, z: jax.Array, y: jax.Array) -> tuple:
+        def step(state: tuple, some: jax.Array) -> tuple[tuple, None]:
+            weights, first, second, count = state
             slope = jax.grad(loss)(weights, z[some], y[some])
-            way, state = adam.update(slope, state)
-            return (jax.tree.map(lambda w, v: w - rate * v, weights, way), state), None
+            first = jax.tree.map(lambda m, g: _B1 * m + (1 - _B1) * g, first, slope)
+            second = jax.tree.map(lambda v, g: _B2 * v + (1 - _B2) * g * g, second, slope)
+            count = count + 1.0
+            long = rate * jnp.sqrt(1 - _B2**count) / (1 - _B1**count)
+            weights = jax.tree.map(lambda w, m, v: w - long * m / (jnp.sqrt(v) + 1e-8), weights, first, second)
+            return (weights, first, second, count), None
 
-        return jax.lax.scan(step, (weights, state), rows)[0]
+        return jax.lax.scan(step, state, rows)[0]
 
+    steps, seconds = budget
     rng, z_all, y_all = np.random.default_rng(seed), jnp.asarray(z), jnp.asarray(y)
     weights = jax.tree.map(jnp.asarray, _first_weights(rng, z.shape[1], y.shape[1]))
-    state, start, done = adam.init(weights), time.perf_counter(), 0.0
-    for count in range(0, _STEPS, _CHUNK):
-        done = max(count / _STEPS, (time.perf_counter() - start) / seconds)
+    still = jax.tree.map(jnp.zeros_like, weights)
+    state, start = (weights, still, still, jnp.zeros((), jnp.float32)), time.perf_counter()
+    for count in range(0, steps, _CHUNK):
+        done = max(count / steps, (time.perf_counter() - start) / seconds)
         if done >= 1:
             break
         rate = _RATE * min(1.0, (count / _CHUNK + 1) / 5) * 0.5 * (1 + np.cos(np.pi * done)) + 1e-7
         rows = jnp.asarray(rng.integers(0, len(z), (_CHUNK, min(_BATCH, len(z)))))
-        weights, state = jax.block_until_ready(
-            chunk(weights, state, rows, jnp.asarray(rate, jnp.float32), z_all, y_all)
-        )
+        state = jax.block_until_ready(chunk(state, rows, jnp.asarray(rate, jnp.float32), z_all, y_all))
         tell(done)
-    return jax.tree.map(np.asarray, weights)
+    return jax.tree.map(np.asarray, state[0])
 
 
 def _first_weights(rng: np.random.Generator, inputs: int, space: int) -> tuple[tuple[Layer, ...], np.ndarray]:
