@@ -1,0 +1,1 @@
+"""Inverse kinematics beside its peers: the same bodies, the same targets, one thread, one run."""
