@@ -111,7 +111,7 @@ def _join(path: Path, found: dict[str, object]) -> None:
     whole = {
         "benchmark": "reaching_no_prior",
         "what": f"nothing assumed of the body; {TARGETS} unseen reachable targets, errors in mm after 0, 1, ... looks",
-        "command": "python -m benchmarks.reaching.no_prior --body BODY --kind KIND --noise NOISE --seed SEED --out FILE",
+        "command": "python -m benchmarks.reaching.no_prior --body BODY --kind KIND --noise METRES --seed SEED",
         "versions": versions(),
         "cells": sorted(cells, key=lambda each: tuple(each[part] for part in key)),
     }

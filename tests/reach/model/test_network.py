@@ -37,7 +37,7 @@ def sliding(count, noise=0.0, seed=0):
     return Experience(q, tip(q) + noise * rng.normal(size=(count, 3))), lower, upper, unseen, tip(unseen)
 
 
-FITS = {"kernel": fit_kernel, "network": lambda *given, **more: fit_network(*given, **more, steps=1200)}
+FITS = {"kernel": fit_kernel, "network": lambda *given, **more: fit_network(*given, **more, steps=1200, fewest=0)}
 COUNTS = {"kernel": 200, "network": 3000}
 BODIES = {"turning": turning, "sliding": sliding}
 
@@ -138,6 +138,11 @@ def test_the_same_seed_gives_the_same_network():
     experience, lower, upper, unseen, _ = sliding(100)
     one, two = (FITS["kernel"](experience, lower, upper, seed=3).model.forward(unseen) for _ in range(2))
     np.testing.assert_array_equal(one, two)
+
+
+def test_few_movements_get_a_kernel():
+    experience, lower, upper, *_ = sliding(60)
+    assert fit_network(experience, lower, upper).kind == "kernel"
 
 
 def test_too_few_movements_are_refused():

@@ -56,7 +56,7 @@ class Fit:
 
     Attributes:
         model: the learned body.
-        kind: its structure: "screws", "multilinear", "curvature" or "network".
+        kind: its structure: "screws", "multilinear", "curvature", "kernel" or "network".
         miss: distance between the seen and the modelled tip in each movement [m].
         sensor: standard deviation of the seen tip on each axis, as estimated from the fit [m].
         wild: movements that the fit left out as outliers.

@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from toddle.reach.model.covariance import Doubt, doubt_from, learn_covariance
-from toddle.reach.model.kernel import PART, check_count
+from toddle.reach.model.kernel import MOST, PART, check_count, fit_kernel
 from toddle.reach.model.model import Fit
 from toddle.signals import Experience
 
@@ -127,24 +127,31 @@ def fit_network(
     *,
     turns: Bool[np.ndarray, " joints"] | None = None,
     seed: int = 0,
+    fewest: int = MOST + 1,
     steps: int = 16_000,
     seconds: float = 60.0,
     tell: Callable[[float], None] | None = None,
 ) -> Fit:
-    """Learn any body from ten thousand movements or more; a kernel (`fit_kernel`) is better on fewer.
+    """Learn any body of which nothing is known.
 
     Args:
         experience: the movements [rad or m, m].
         lower, upper: the joints' limits [rad or m].
         turns: joints whose value is an angle [rad]; None: all of them or none, whichever explains the movements better.
         seed: of the first weights and of the order of the movements.
+        fewest: from fewer movements a kernel is learned instead (`fit_kernel`), which makes more of them.
         steps: of training; they take about a minute of one core.
         seconds: training ends by then [s], its rate falling sooner. In time, the same seed gives the same network.
         tell: called with the fraction done.
 
+    Returns:
+        The fit, of kind "network" or "kernel".
+
     Raises:
         BadInput: there are fewer than four movements a joint.
     """
+    if len(experience.q) < fewest:
+        return fit_kernel(experience, lower, upper, turns=turns, seed=seed, tell=tell)
     start = time.perf_counter()
     check_count(experience, len(lower))
     order = np.random.default_rng(seed).permutation(len(experience.q))
