@@ -19,7 +19,7 @@ from jaxtyping import Float, Int
 from toddle.reach.model.curvature_chain import Shape, degrees, places
 
 _LEAST_TAU = 1e-6  # of the numbers' own scale
-_ROUNDS = 60
+_ROUNDS, _SETTLED = 60, 1e-3
 
 
 class Regularity(NamedTuple):
@@ -93,7 +93,9 @@ def learned(groups: list[Regularity], data: Normal, floor: Normal) -> list[Regul
         prior = joined(groups, len(data.pull))
         covariance = np.linalg.inv(data.precision + floor.precision + prior.precision)
         mean = covariance @ (data.pull + floor.pull + prior.pull)
-        groups = [_updated(group, mean, covariance) for group in groups]
+        before, groups = groups, [_updated(group, mean, covariance) for group in groups]
+        if all(abs(new.tau / old.tau - 1) < _SETTLED for new, old in zip(groups, before, strict=True)):
+            break
     return groups
 
 
@@ -101,7 +103,7 @@ def _updated(
     group: Regularity, mean: Float[np.ndarray, " numbers"], covariance: Float[np.ndarray, "numbers numbers"]
 ) -> Regularity:
     off = group.rows @ mean - group.value
-    known = len(off) - np.einsum("ij,jk,ik->", group.rows, covariance, group.rows) / group.tau**2
+    known = len(off) - float(((group.rows @ covariance) * group.rows).sum()) / group.tau**2
     tau = float(np.sqrt(off @ off / max(known, 1e-6 * len(off)))) if known > 0 else group.tau
     return group._replace(tau=float(np.clip(tau, max(_LEAST_TAU, group.tau / 4), 10.0)))
 
