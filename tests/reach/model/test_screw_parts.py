@@ -10,7 +10,17 @@ from hypothesis import strategies as st
 from toddle.reach.explore.isolating import isolating_movements
 from toddle.reach.explore.outward import outward_movements
 from toddle.reach.model.rigid import changed, number_slopes
-from toddle.reach.model.screw_arms import Arms, from_lines, lines_of, linkage_from, move, recentred, stepped, tidied
+from toddle.reach.model.screw_arms import (
+    Arms,
+    from_lines,
+    lines_of,
+    linkage_from,
+    move,
+    recentred,
+    stepped,
+    tidied,
+    without,
+)
 from toddle.reach.model.screw_isolation import alone
 from toddle.reach.model.screw_start import lack_of_fit, robust_sigma
 from toddle.reach.model.screw_steps import turned
@@ -18,13 +28,13 @@ from toddle.reach.model.screw_types import sliding
 from toddle.robots.linkage import poses
 
 
-def some_arms(seed: int, axes: int = 4, count: int = 3) -> Arms:
+def some_arms(seed: int, axes: int = 4, count: int = 3, ways: tuple[int, ...] = (1,)) -> Arms:
     rng = np.random.default_rng(seed)
     shape = (count, axes, 3)
     slides = rng.integers(0, 2, (count, axes)).astype(float)
     motor = np.tile(np.arange(axes), (count, 1))
     arms = from_lines(rng.normal(size=shape), rng.normal(size=shape), slides, rng.normal(size=(count, 3)), motor)
-    return arms._replace(gain=rng.uniform(0.5, 1.5, (count, axes)))
+    return arms._replace(gain=rng.uniform(0.5, 1.5, (count, axes)) * rng.choice(ways, (count, axes)))
 
 
 def test_candidates_move_as_linkages_do_and_so_do_their_slopes() -> None:
@@ -51,11 +61,18 @@ def test_a_step_of_candidates_is_that_of_linkages() -> None:
 
 @given(seed=st.integers(0, 10**6))
 def test_what_only_writes_an_arm_differently_leaves_it_where_it_is(seed: int) -> None:
-    arms, rng = some_arms(seed, count=1), np.random.default_rng(seed)
+    arms, rng = some_arms(seed, count=1, ways=(1, -1)), np.random.default_rng(seed)
     q, shift = rng.normal(size=(5, 4)), rng.normal(size=4)
     there = poses(linkage_from(arms, np.zeros(4)), q)
     np.testing.assert_allclose(poses(linkage_from(tidied(arms), np.zeros(4)), q), there, atol=1e-9)
     np.testing.assert_allclose(poses(linkage_from(recentred(arms, shift), shift), q), there, atol=1e-9)
+
+
+def test_an_arm_without_an_axis_is_the_arm_with_that_joint_at_zero() -> None:
+    arms, q = some_arms(4), np.random.default_rng(5).normal(size=(6, 4))
+    q[:, 2] = 0.0
+    none = np.zeros(0, int)
+    np.testing.assert_allclose(move(without(arms, 2), q, none).place, move(arms, q, none).place, atol=1e-9)
 
 
 @given(seed=st.integers(0, 10**6))

@@ -179,6 +179,15 @@ def side_by_side(groups: list[Arms]) -> Arms:
     return Arms(*(np.concatenate(values) for values in zip(*groups, strict=True)))
 
 
+def without(arms: Arms, axis: int) -> Arms:
+    """The same arms with one axis less, all others where they are at zero motion."""
+    along, through, tip = lines_of(arms)
+    end = resting(arms)[:, -1] @ arms.tip
+    kept = [np.delete(values, axis, axis=1) for values in (along, through, arms.slides, arms.motor, arms.gain)]
+    less = from_lines(kept[0], kept[1], kept[2], tip, kept[3])._replace(gain=kept[4])
+    return less._replace(tip=np.linalg.inv(resting(less)[:, -1]) @ end)
+
+
 def recentred(arms: Arms, shift: Float[np.ndarray, " joints"]) -> Arms:
     """The same arms for joint values that count from further on: q less the shift."""
     motion = arms.gain * shift[arms.motor]
@@ -211,9 +220,11 @@ def lines_of(arms: Arms) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def tidied(arms: Arms) -> Arms:
-    """The same arms with every axis' frame where its axis is nearest to the tip, all joints zero."""
+    """The same arms, every axis' frame where its axis is nearest to the tip, pointing so that its gain is positive."""
     along, through, tip = lines_of(arms)
     ahead = ((tip[:, None] - through) * along).sum(axis=-1, keepdims=True)
-    tidy = from_lines(along, through + ahead * along, arms.slides, tip, arms.motor)._replace(gain=arms.gain)
+    way = np.where(arms.gain < 0, -1.0, 1.0)
+    tidy = from_lines(way[..., None] * along, through + ahead * along, arms.slides, tip, arms.motor)
+    tidy = tidy._replace(gain=way * arms.gain)
     end = resting(arms)[:, -1] @ arms.tip
     return tidy._replace(tip=np.linalg.inv(resting(tidy)[:, -1]) @ end)

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from toddle.reach.model.rigid import PER_AXIS, number_slopes
-from toddle.reach.model.screw_arms import Arms
+from toddle.reach.model.screw_arms import Arms, without
 from toddle.reach.model.screw_start import robust_sigma
 from toddle.reach.model.screw_steps import NONE, Seen, descend, look
 from toddle.reach.model.screw_types import free_numbers, held_numbers, idling, sliding, suspects, travel
@@ -61,7 +61,10 @@ def finished(arms: Arms, gains: Bool[np.ndarray, " axes"], seen: Seen) -> Final:
             final = _simpler(final, _settled(idle, kept, seen, final.wild, rows), seen, rows)
             continue
         final = _simpler(final, _settled(slid, final.gains, seen, final.wild, rows), seen, rows)
-    for which in _gains_to_try(final, seen):
+    for axis in np.flatnonzero(~_first_axes(final.arms))[::-1]:
+        shorter, kept = without(final.arms, int(axis)), np.delete(final.gains, axis)
+        final = _simpler(final, _settled(shorter, kept, seen, final.wild, rows), seen, rows)
+    for which in _gains_to_try(final, seen, rows):
         final = _simpler(final, _settled(_unit(final.arms, which), which, seen, final.wild, rows), seen, rows)
     return final
 
@@ -113,12 +116,17 @@ def _wild(square: Float[np.ndarray, " movements"], sigma: float, rows: int) -> B
     return found if found.mean() < 0.5 else np.zeros(len(square), bool)
 
 
-def _gains_to_try(final: Final, seen: Seen) -> list[Bool[np.ndarray, " axes"]]:
-    """Other choices of gains: all free where none is, and those fixed that lie within three deviations of 1."""
+def _gains_to_try(final: Final, seen: Seen, rows: int) -> list[Bool[np.ndarray, " axes"]]:
+    """Other choices of gains: those that lie far from 1 when all are free, and none but those of second axes."""
     followers = ~_first_axes(final.arms)
-    if not (final.gains & ~followers).any():
-        return [np.ones(len(final.gains), bool)]
-    return [followers, final.gains & (_far_from_unit(final, seen) | followers)]
+    every = _settled(final.arms, np.ones(len(final.gains), bool), seen, final.wild, rows)
+    return [followers, followers | (_far_from_unit(every, seen) & ~_idle(final, seen))]
+
+
+def _idle(final: Final, seen: Seen) -> Bool[np.ndarray, " axes"]:
+    """Axes that move the tip by too little for their gain to be told."""
+    turned = look(final.arms, seen, PER_AXIS * np.arange(len(final.gains)) + 5).slope[0]
+    return (final.arms.slides[0] == 0) & (np.sqrt((turned**2).sum(axis=(1, 2))) < 20 * final.sigma)
 
 
 def _first_axes(arms: Arms) -> Bool[np.ndarray, " axes"]:
@@ -136,7 +144,7 @@ def _far_from_unit(final: Final, seen: Seen) -> Bool[np.ndarray, " axes"]:
     stretched = (final.free % PER_AXIS == 6) & (final.free < PER_AXIS * len(final.gains))
     axes = final.free[stretched] // PER_AXIS
     deviation = np.sqrt(variance[stretched]) * np.abs(final.arms.gain[0, axes])
-    far[axes] = np.abs(np.abs(final.arms.gain[0, axes]) - 1) > 3 * deviation + 1e-9
+    far[axes] = np.abs(np.abs(final.arms.gain[0, axes]) - 1) > 3 * deviation + 1e-7
     return far
 
 

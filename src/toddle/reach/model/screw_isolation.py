@@ -18,6 +18,7 @@ from toddle.reach.model.screw_types import free_numbers, held_numbers, sliding, 
 
 _STARTS = 6
 _UNUSUAL = 6.0  # times as large as usual: not one axis, or a wild movement
+_CLEAR = 50.0  # times the usual miss: what the tip has to go for its axis to be clear
 _LARGEST_GAIN = 4.0
 _EXACT = 1e-9  # [m]
 _FEWEST = 2  # movements of a joint, besides where all stay
@@ -32,6 +33,7 @@ class Isolated(NamedTuple):
         slides: 1.0 where an axis slides.
         gain: motion of each axis for a unit of its joint.
         miss: root mean square of each coordinate's miss, joint by joint, for the numbers that were spent [m].
+        travel: how far the tip went from home at most, joint by joint [m].
         tip: where the tip is [m].
         posture: where the joints stay, less the centre [rad or m].
     """
@@ -41,6 +43,7 @@ class Isolated(NamedTuple):
     slides: Float[np.ndarray, " joints"]
     gain: Float[np.ndarray, " joints"]
     miss: Float[np.ndarray, " joints"]
+    travel: Float[np.ndarray, " joints"]
     tip: Float[np.ndarray, "3"]
     posture: Float[np.ndarray, " joints"]
 
@@ -91,15 +94,16 @@ def isolated(seen: Seen, slides: Float[np.ndarray, " joints"] | None, rng: np.ra
         if axes[joint].miss > _UNUSUAL * common + _EXACT and len(path.q) > _FEWEST + 2:
             axes[joint] = _without_one(axes[joint], path, float(kind), common, rng)
     along, through, slides, gain, miss = (np.array(values) for values in zip(*axes, strict=True))
-    return Isolated(along, through, slides, gain, miss, tip, posture)
+    travel = np.array([np.linalg.norm(path.x - tip, axis=1).max() for path in paths])
+    return Isolated(along, through, slides, gain, miss, travel, tip, posture)
 
 
 def isolated_arms(found: Isolated, count: int, seen: Seen, rng: np.random.Generator) -> Arms:
-    """Starts from the axes that were found; all but the first with those that miss by much drawn at random."""
+    """Starts from the axes that were found; all but the first with the unclear ones drawn at random."""
     joints = len(found.gain)
     motor = np.tile(np.arange(joints), (count, 1))
     drawn = lines_of(random_arms(count, seen, found.slides, motor[0], rng))
-    redrawn = doubtful(found.miss) & (np.arange(count) > 0)[:, None]
+    redrawn = unclear(found) & (np.arange(count) > 0)[:, None]
     along = np.where(redrawn[..., None], drawn[0], found.along)
     through = np.where(redrawn[..., None], drawn[1], found.through)
     slides = np.where(redrawn, 0.0, found.slides)
@@ -110,6 +114,11 @@ def isolated_arms(found: Isolated, count: int, seen: Seen, rng: np.random.Genera
 def doubtful(miss: Float[np.ndarray, " joints"]) -> Bool[np.ndarray, " joints"]:
     """Joints whose own movements are explained much worse than the others'."""
     return miss > _UNUSUAL * usual(miss) + _EXACT
+
+
+def unclear(found: Isolated) -> Bool[np.ndarray, " joints"]:
+    """Joints that are doubtful, or whose axis runs so near to the tip that it may point anywhere."""
+    return doubtful(found.miss) | (found.travel < _CLEAR * usual(found.miss) + _EXACT)
 
 
 def usual(miss: Float[np.ndarray, " joints"]) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from toddle.reach.model.screw_arms import Arms
-from toddle.reach.model.screw_isolation import Isolated, doubtful, isolated, isolated_arms, usual
+from toddle.reach.model.screw_isolation import Isolated, doubtful, isolated, isolated_arms, unclear, usual
 from toddle.reach.model.screw_mimic import with_followers
 from toddle.reach.model.screw_plane import plane_arms
 from toddle.reach.model.screw_start import lack_of_fit, random_arms, robust_sigma
@@ -104,7 +104,7 @@ def _starts(task: _Task, *, gains: bool) -> Arms:
 def _as_shown(shown: Isolated, task: _Task) -> Iterator[Candidate]:
     """From the axes that movements of single joints showed."""
     joints = len(shown.gain)
-    count = 8 if doubtful(shown.miss).any() else 1
+    count = 8 if unclear(shown).any() else 1
     if _near_unit(shown).all():
         rounded = shown._replace(gain=np.sign(shown.gain))
         yield tried(isolated_arms(rounded, count, task.seen, task.rng), np.zeros(joints, bool), task)[0]
