@@ -1,0 +1,146 @@
+"""The answer that is exported: damped least squares in float32, from the stored postures that are nearest.
+
+As in `toddle.reach.solve.damped_kernels`, each step solves (J J' + lambda I) y = e and moves the joints by J' y, with
+lambda = 0.02 |e|^2 + 1e-9 (Wampler 1986; Sugihara 2011), and a joint that would pass its limit stops there while the
+others take over. Eight starts go side by side; where none arrives in fourteen steps, the next eight have their turn.
+Every target goes its own way: an answer doesn't depend on what else is in the batch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from toddle.outside.export_ops import Ops, State, Tensor
+
+LANES, ROUNDS, STEPS = 8, 6, 14
+_REACHED = 1e-5  # [m]
+_DAMPING, _LEAST = 0.02, 1e-9
+_LIMITED = 2  # solves in a step, each without the joints that the one before would have carried past a limit
+_FAR = 1e30
+
+
+class Miss(NamedTuple):
+    """What is missing at postures, all (batch, lanes, ...).
+
+    Attributes:
+        error: what the tip still has to do [m] (rows, 1).
+        slope: how the joints do it, each by its scale [m] (rows, joints).
+        square: squared distance to the target [m^2] (1).
+        angle: between the orientation there and the one asked for [rad] (1).
+    """
+
+    error: Tensor
+    slope: Tensor
+    square: Tensor
+    angle: Tensor
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A body to be exported, as numbers and as what its model computes.
+
+    Attributes:
+        lower: lower limits [rad or m].
+        upper: upper limits.
+        scale: what a joint moves for a step of one [rad or m].
+        stride: the longest step.
+        starts: stored postures.
+        places: where they put the tip, and how it is turned [m].
+        rows: of the task: position, and orientation where it is known.
+        lever: what an angle counts for [m/rad].
+        goal: operations and the inputs to the target as ``places`` has it, and what ``miss`` is to know of it.
+        miss: operations, postures and goal to what is missing there.
+    """
+
+    lower: Float[np.ndarray, " joints"]
+    upper: Float[np.ndarray, " joints"]
+    scale: Float[np.ndarray, " joints"]
+    stride: float
+    starts: Float[np.ndarray, "starts joints"]
+    places: Float[np.ndarray, "starts places"]
+    rows: int
+    lever: float
+    goal: Callable[..., tuple[Tensor, Tensor]]
+    miss: Callable[[Ops, Tensor, Tensor], Miss]
+
+
+def answered(ops: Ops, problem: Problem, *inputs: Tensor) -> dict[str, Tensor]:
+    """The outputs: joint values (batch, joints), distance [m] and angle [rad] (batch)."""
+    place, goal = problem.goal(ops, *inputs)
+    lanes, joints = min(LANES, len(problem.starts)), len(problem.lower)
+    rounds = min(ROUNDS, len(problem.starts) // lanes)
+    far = np.sum(problem.places**2, axis=1)[None]
+    cost = ops.constant(far) - 2.0 * ops.matmul(place, ops.constant(problem.places.T))
+    starts = ops.shape(ops.rows(problem.starts, cost, lanes * rounds), (rounds, lanes, joints))
+    first = ops.shape(ops.take(starts, [0], 1), (lanes, joints))
+    best = first, 0.0 * ops.sum(first, -1) + _FAR
+
+    def descent(number: Tensor, best: State) -> tuple[State, Tensor]:
+        q = ops.at(starts, number, 1)
+        _, *found = ops.repeat(STEPS, lambda _, state: _stepped(ops, problem, goal, *state), (q, *best))
+        return tuple(found), _unsolved(ops, found[1])
+
+    q, total = ops.repeat(rounds, descent, best)
+    level = ops.maximum(total, ops.constant(_REACHED**2))  # all that arrived are as good: the nearest start's is taken
+    chosen = ops.sum(q * ops.first_least(level, lanes, 1), 1)
+    end = problem.miss(ops, chosen, goal)
+    outputs = {"joints": ops.shape(chosen, (joints,)), "distance": ops.shape(ops.sqrt(end.square), ())}
+    return outputs if problem.rows <= 3 else {**outputs, "angle": ops.shape(end.angle, ())}
+
+
+def _unsolved(ops: Ops, total: Tensor) -> Tensor:
+    """(batch, 1, 1) whether no lane of a target has arrived."""
+    return ops.least(total, 1) > _REACHED**2
+
+
+def _stepped(ops: Ops, problem: Problem, goal: Tensor, q: Tensor, best: Tensor, least: Tensor) -> tuple[State, Tensor]:
+    """Look where the postures are, keep the best of each lane, and go on where the target isn't reached."""
+    miss = problem.miss(ops, q, goal)
+    total = miss.square + problem.lever**2 * miss.angle * miss.angle
+    better = (total < least) & _unsolved(ops, least)
+    best, least = ops.where(better, q, best), ops.where(better, total, least)
+    left = _unsolved(ops, least)
+    return (ops.where(left, _moved(ops, problem, miss, total, q), q), best, least), left
+
+
+def _moved(ops: Ops, problem: Problem, miss: Miss, total: Tensor, q: Tensor) -> Tensor:
+    """The postures after a damped step within the limits."""
+    lower, upper, scale = (ops.constant(part[None, None]) for part in (problem.lower, problem.upper, problem.scale))
+    lanes, joints = min(LANES, len(problem.starts)), len(problem.scale)
+    damping = ops.shape(_DAMPING * total + _LEAST, (lanes, 1, 1))
+    error, slope, held = miss.error, miss.slope, 0.0 * q
+    for _ in range(_LIMITED - 1):
+        aim = q + _step(ops, problem, error, slope, damping) * scale
+        end = ops.minimum(ops.maximum(aim, lower), upper)
+        free = (lower <= aim) & (aim <= upper)
+        stopped = ops.where(free, 0.0 * q, (end - q) / scale)
+        held = held + stopped
+        error = error - ops.matmul(slope, ops.shape(stopped, (lanes, joints, 1)))
+        slope = ops.where(ops.shape(free, (lanes, 1, joints)), slope, 0.0 * slope)
+    step = held + _step(ops, problem, error, slope, damping)
+    longest = ops.maximum(ops.greatest(step, -1), -ops.least(step, -1))
+    part = ops.minimum(ops.constant(1.0), problem.stride / ops.maximum(longest, ops.constant(1e-12)))
+    return ops.minimum(ops.maximum(q + part * step * scale, lower), upper)
+
+
+def _step(ops: Ops, problem: Problem, error: Tensor, slope: Tensor, damping: Tensor) -> Tensor:
+    """J' y with (J J' + lambda I) y = e."""
+    across = ops.turned(slope)
+    pull = _solved(ops, ops.matmul(slope, across), error, damping, problem.rows)
+    return ops.shape(ops.matmul(across, pull), (-1, len(problem.scale)))
+
+
+def _solved(ops: Ops, matrix: Tensor, right: Tensor, damping: Tensor, rows: int) -> Tensor:
+    """(A + lambda I)^-1 b for a positive A, by Gauss and Jordan: it needs no pivoting then, and no linear algebra."""
+    unit = np.eye(rows)
+    table = ops.join([matrix + damping * ops.constant(unit[None, None]), right], -1)
+    for k in range(rows):
+        row = ops.take(table, [k], -2)
+        row = row / ops.maximum(ops.take(row, [k], -1), damping)
+        table = table - (ops.take(table, [k], -1) - ops.constant(unit[None, None, :, k : k + 1])) * row
+    return ops.take(table, [rows], -1)
