@@ -14,9 +14,15 @@ from toddle.outside.files import make_folder, read_record, write_record
 from toddle.outside.records import Tensors, put_together, taken_apart
 from toddle.reach.body_config import BodyConfig
 from toddle.reach.body_skill import BodySkill
+from toddle.reach.model.covariance import Doubt, Embedding
+from toddle.reach.model.crippled import Crippled
 from toddle.reach.model.curvature import Curvature
 from toddle.reach.model.curvature_chain import Shape
+from toddle.reach.model.curvature_rest import Mended, Rest
+from toddle.reach.model.kernel import Kernel
 from toddle.reach.model.model import Fit
+from toddle.reach.model.multilinear import Multilinear
+from toddle.reach.model.network import Layer, Network
 from toddle.reach.model.rigid import Rigid
 from toddle.robots.body import Body, Plant, Resumable
 from toddle.robots.catalogue import Choice
@@ -26,8 +32,12 @@ from toddle.signals import Experience
 BODY = "body"
 _RUN, _AGAIN = "movements", "learn it again"
 _CLASSES: dict[str, type] = {
-    kind.__name__: kind for kind in (BodyConfig, BodySkill, Choice, Curvature, Experience, Fit, Linkage, Rigid, Shape)
-}
+    kind.__name__: kind
+    for kind in (
+        BodyConfig, BodySkill, Choice, Crippled, Curvature, Doubt, Embedding, Experience, Fit, Kernel, Layer, Linkage,
+        Mended, Multilinear, Network, Rest, Rigid, Shape,
+    )
+}  # fmt: skip
 """What a skill's files may name: nothing else is ever made of them."""
 
 

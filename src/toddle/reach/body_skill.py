@@ -21,7 +21,7 @@ from toddle.reach.observe import Observe, observer
 from toddle.reach.solve.looking import correct
 from toddle.reach.solve.solver import Choice as Posture
 from toddle.reach.solve.solver import Solver, solver_of
-from toddle.reach.structures import parted
+from toddle.reach.structures import part
 from toddle.robots.body import Body, Plant
 from toddle.robots.catalogue import Choice
 from toddle.signals import Experience, Solution, Verdict
@@ -74,9 +74,10 @@ class BodySkill:
     @cached_property
     def expectation(self) -> Expectation:
         """How far from the target its answers end."""
-        shown, held = parted(self.experience, self.fit.kind)
-        if held is None:
-            return Expectation.of(self.fit, shown, sensor=self.config.noise)
+        shown, count = len(self.fit.miss), len(self.experience.q)
+        if shown == count:
+            return Expectation.of(self.fit, self.experience, sensor=self.config.noise)
+        held = part(self.experience, shown, count)
         return Expectation.held_out(self.fit.model, held, sensor=self.config.noise)
 
     @cached_property

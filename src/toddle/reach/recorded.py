@@ -121,7 +121,8 @@ def _corrected(
 def _told(skill: BodySkill, fold: Callable[[Experience], Callable[[np.ndarray], np.ndarray]]) -> BodySkill:
     """The skill with figures from folds of its movements."""
     errors = held_out_errors(skill.experience, fold, skill.config.seed)
-    tame = ~skill.fit.wild
+    tame = np.ones(len(errors), bool)
+    tame[: len(skill.fit.wild)] = ~skill.fit.wild
     mean, most = skill.expectation.at(skill.experience.q)
     targets = skill.experience.x[tame]
     solver = skill.solver

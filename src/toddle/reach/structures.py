@@ -131,18 +131,16 @@ def suited(body: Body | Plant | None) -> tuple[tuple[str, ...], str]:
     return ("screws", "curvature", *few, "network"), "nobody described it, so one structure after the other is tried"
 
 
-def parted(experience: Experience, name: str) -> tuple[Experience, Experience | None]:
-    """The movements that a structure is fitted to, and those that are held out where it needs some; the last tenth."""
-    structure = STRUCTURES.get(name)
-    if structure is None or not structure.tests_itself:
-        return experience, None
-    cut = len(experience.q) - max(10, len(experience.q) // 10)
-    turn = experience.turn
-    first, last = (None, None) if turn is None else (turn[:cut], turn[cut:])
-    return (
-        Experience(experience.q[:cut], experience.x[:cut], first),
-        Experience(experience.q[cut:], experience.x[cut:], last),
-    )
+def part(experience: Experience, first: int, last: int) -> Experience:
+    """The movements from one number to before another."""
+    turn = None if experience.turn is None else experience.turn[first:last]
+    return Experience(experience.q[first:last], experience.x[first:last], turn)
+
+
+def _shown(experience: Experience, structure: Structure) -> Experience:
+    """What a structure is fitted to: all movements, or all but the last tenth where some must be held out."""
+    count = len(experience.q)
+    return part(experience, 0, count - max(10, count // 10)) if structure.tests_itself else experience
 
 
 def fit_body(experience: Experience, known: Known, names: tuple[str, ...], seed: int, tell: Tell) -> tuple[Fit, str]:
@@ -168,8 +166,9 @@ def fit_body(experience: Experience, known: Known, names: tuple[str, ...], seed:
     refused: list[BadInput] = []
     for name in names:
         try:
-            shown, _ = parted(experience, name)
-            fit = structure_named(name).fit(shown, known, seed)
+            structure = structure_named(name)
+            shown = _shown(experience, structure)
+            fit = structure.fit(shown, known, seed)
         except BadInput as fault:
             refused.append(fault)
             continue

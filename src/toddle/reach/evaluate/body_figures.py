@@ -65,7 +65,7 @@ def figures_of(
         "verdicts": _verdicts(answers.distance > skill.doubt),
     }
     fixed = _error(skill, robot, judge, skill.targets)
-    seen = _error(skill, robot, judge, skill.experience.x[~skill.fit.wild][: len(targets)])
+    seen = _error(skill, robot, judge, skill.experience.x[: len(skill.fit.wild)][~skill.fit.wild][: len(targets)])
     figures |= error_figures("fixed_error", fixed) | error_figures("seen_error", seen)
     figures |= _looks(skill, robot, judge, targets[:_LOOKED_AT], answers.q[:_LOOKED_AT])
     solve = skill.solver.solve
