@@ -153,7 +153,7 @@ URDF: dict[str, tuple[str | bytes, dict[str, Any], str]] = {
     "planar": (_two("", "planar"), {}, "joint 'two': it lies between base 'a' and tip 'c'.*neither"),
     "floating base": (
         _robot(_joint("one", "a", "b", kind="floating"), _joint("two", "b", "c")),
-        {},
+        {"base": "a"},
         "joint 'one'.*name a base beyond it, such as 'b'",
     ),
     "mimic of nobody": (_two(LIMIT + "<mimic/>"), {}, "joint 'two': its <mimic> names no joint"),
@@ -201,7 +201,7 @@ MJCF: dict[str, tuple[str | bytes, dict[str, Any], str]] = {
     ),
     "free": (
         _body('<freejoint name="one"/><body name="b">' + HINGE.replace("one", "two") + "</body>"),
-        {},
+        {"base": "world"},
         "joint 'one': it lies.*name a base beyond it, such as 'a'",
     ),
     "slider without range": (_body('<joint name="one" type="slide"/>'), {}, "joint 'one': it has no limits"),

@@ -34,6 +34,7 @@ class Chain(Body):
         tip: transform from the last axis' frame to the tip [m].
         coordinates: which of x, y, z the tip's position is reported in: (0, 1) for a planar arm.
         links: names of the links that each axis carries, up to the next one; empty where they have none.
+        notes: what was inferred where nothing was named, in sentences.
     """
 
     name: str = eqx.field(static=True)
@@ -48,6 +49,7 @@ class Chain(Body):
     tip: Float[Array, "4 4"]
     coordinates: tuple[int, ...] = eqx.field(static=True, default=(0, 1, 2))
     links: tuple[tuple[str, ...], ...] = eqx.field(static=True, default=())
+    notes: tuple[str, ...] = eqx.field(static=True, default=())
 
     @property
     def carriers(self) -> dict[str, str]:

@@ -40,8 +40,8 @@ def read_mjcf(
 
     Args:
         path: the file.
-        tip: the body or site whose position is reported; None: the only body at an end of the tree.
-        base: the body or site in whose frame it is reported; None: the world.
+        tip: the body or site whose position is reported; None: inferred, see `tips.infer_tip`.
+        base: the body or site in whose frame it is reported; None: the world, or what floats in it.
         joints: names of the actuated joints; None: every joint that moves the tip.
 
     Returns:
@@ -155,11 +155,11 @@ def _motion(model: mujoco.MjModel, i: int, origin: np.ndarray, followers: dict[i
         turn = transform(turning_z_to(axis), np.zeros(3))
         return Motion(origin @ turn @ z_motion(value, slides=not hinge) @ turn.T, axis)
     lower, upper = (float(limit) for limit in model.jnt_range[i])
-    if model.jnt_limited[i] or lower > upper:  # MuJoCo takes limits in the wrong order for none
-        limits = (lower, upper)
-    else:
-        limits = (reference - math.pi, reference + math.pi) if hinge else None
-    return Motion(origin, axis, limits, _follows(model, i, followers, where), reference)
+    limited = bool(model.jnt_limited[i]) or lower > upper  # MuJoCo takes limits in the wrong order for none
+    endless = hinge and not limited
+    turn = (reference - math.pi, reference + math.pi) if endless else None
+    limits = (lower, upper) if limited else turn
+    return Motion(origin, axis, limits, _follows(model, i, followers, where), reference, endless)
 
 
 def _is_locked(model: mujoco.MjModel, i: int, followers: dict[int, int]) -> bool:

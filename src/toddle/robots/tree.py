@@ -46,6 +46,7 @@ class Motion:
         limits: lower and upper limit [rad or m], or None where the file gives none.
         follows: the rule of a mimic joint; its own limits then do not count, its leader's do.
         reference: the joint's value at which its motion is zero [rad or m].
+        endless: whether it turns without limits, those given here are only where its values are sought.
     """
 
     origin: Transform
@@ -53,6 +54,12 @@ class Motion:
     limits: tuple[float, float] | None = None
     follows: Follows | None = None
     reference: float = 0.0
+    endless: bool = False
+
+    @property
+    def still(self) -> bool:
+        """Whether its limits are both zero: it stands still, or its file was never filled in."""
+        return self.follows is None and self.limits == (0.0, 0.0)
 
 
 @dataclass(frozen=True)

@@ -39,8 +39,8 @@ def read_urdf(
 
     Args:
         path: the file.
-        tip: the link whose position is reported; None: the only end of the tree.
-        base: the link in whose frame it is reported; None: the root.
+        tip: the link whose position is reported; None: inferred, see `tips.infer_tip`.
+        base: the link in whose frame it is reported; None: the root, or what floats on it.
         joints: names of the actuated joints; None: every joint that moves the tip.
 
     Raises:
@@ -93,6 +93,7 @@ def _motion(element: Element, kind: str, spot: str) -> Motion:
         axis=_axis(element, spot) if kind != "fixed" else np.array([1.0, 0.0, 0.0]),
         limits=_limits(element, kind, spot),
         follows=_follows(element, spot),
+        endless=kind == "continuous",
     )
 
 

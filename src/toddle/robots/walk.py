@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
 import numpy as np
@@ -18,6 +18,7 @@ import numpy as np
 from toddle.failures import BadInput, unknown_name
 from toddle.robots.chain import Chain
 from toddle.robots.frames import inverse, transform, turning_z_to, z_motion
+from toddle.robots.tips import infer_tip
 from toddle.robots.tree import Joint, Kind, Motion, Tree
 
 
@@ -26,20 +27,22 @@ def chain(tree: Tree, *, tip: str | None = None, base: str | None = None, joints
 
     Args:
         tree: the robot.
-        tip: the link whose position is reported; None: the only end of the tree.
-        base: the link in whose frame it is reported, an ancestor of the tip or not; None: the root.
+        tip: the link whose position is reported; None: inferred, see `tips.infer_tip`.
+        base: the link in whose frame it is reported, an ancestor of the tip or not; None: the root, or the
+            first link beyond a joint above the tip that can't be used (a floating base).
         joints: names of the actuated joints, in any order (the chain's is base first); the others are held at
             zero, or at the limit nearest to zero where zero is out of range. None: every joint that moves the
             tip.
 
     Returns:
-        The chain. Its home is what the file proposes, else the middle of each joint's range.
+        The chain. Its home is what the file proposes, else the middle of each joint's range. Its notes tell
+        what was inferred.
 
     Raises:
         BadInput: a name is not there, the tip is ambiguous, nothing moves it, or a joint between the two
             can't be used.
     """
-    base, tip = _ends(tree, base, tip)
+    base, tip, notes = _ends(tree, base, tip, joints)
     path, readings = _path(tree, base, tip), _Readings(tree)
     for i, step in enumerate(path):
         if step.joint.kind is Kind.OTHER:
@@ -49,7 +52,14 @@ def chain(tree: Tree, *, tip: str | None = None, base: str | None = None, joints
                 remedy=_beyond(tree, path[i:]),
             )
     drives = {s.joint.name: readings.drive(s.joint) for s in path if s.joint.kind is not Kind.FIXED}
-    movers = list(dict.fromkeys(drive.leader for drive in drives.values() if drive.gain))
+    leaders = list(dict.fromkeys(drive.leader for drive in drives.values() if drive.gain))
+    movers = [name for name in leaders if not readings.motion(name).still]
+    if leaders and not movers:
+        raise BadInput(
+            f"every joint between {base!r} and {tip!r} has the limits 0 to 0",
+            where=f"{tree.where}: {readings.joints[leaders[0]].label}",
+            remedy="give them ranges",
+        )
     if not movers:
         raise BadInput(
             f"no joint moves {tip!r} with respect to {base!r}",
@@ -57,7 +67,21 @@ def chain(tree: Tree, *, tip: str | None = None, base: str | None = None, joints
             remedy="name a base and a tip with a revolute or prismatic joint between them",
         )
     actuated = movers if joints is None else _chosen(readings, movers, joints)
-    return _assemble(readings, path, drives, actuated)
+    notes += _range_notes(readings, leaders, actuated)
+    return replace(_assemble(readings, path, drives, actuated), notes=tuple(notes))
+
+
+def _range_notes(readings: _Readings, leaders: Sequence[str], actuated: Sequence[str]) -> list[str]:
+    endless = [name for name in actuated if readings.motion(name).endless]
+    still = [name for name in leaders if readings.motion(name).still]
+    notes = []
+    if endless:
+        turn = "turns" if len(endless) == 1 else "turn"
+        notes.append(f"{', '.join(endless)} {turn} without limits: took half a turn either way")
+    if still:
+        have = "has" if len(still) == 1 else "have"
+        notes.append(f"{', '.join(still)} {have} the limits 0 to 0: held at 0")
+    return notes
 
 
 def _beyond(tree: Tree, path: Sequence[_Step]) -> str:
@@ -135,7 +159,7 @@ class _Readings:
 
     def held(self, name: str) -> float:
         """Where a joint that is not actuated stays: zero, or the limit nearest to it."""
-        if self.motion(name).limits is None:
+        if self.motion(name).limits is None or self.motion(name).still:
             return 0.0
         lower, upper = self.limits(name)
         return min(max(0.0, lower), upper)
@@ -146,24 +170,33 @@ class _Readings:
         return home if lower < home < upper else (lower + upper) / 2
 
 
-def _ends(tree: Tree, base: str | None, tip: str | None) -> tuple[str, str]:
-    """The chain's base and tip, by the file's own root and only end where none are named."""
+def _ends(tree: Tree, base: str | None, tip: str | None, joints: Sequence[str] | None) -> tuple[str, str, list[str]]:
+    """The chain's base and tip, inferred where they are not named, and sentences that say so."""
     named = [link for link in tree.links if link not in tree.hidden]
     for link in (base, tip):
         if link is not None and link not in named:
             raise unknown_name("link", link, named, where=tree.where)
-    base = tree.root if base is None else base
-    if tip is not None:
-        return base, tip
-    ends = [end for end in tree.ends if end != base]
-    if len(ends) > 1:
-        shown = ", ".join(ends[:12]) + (", ..." if len(ends) > 12 else "")
-        raise BadInput(
-            f"the robot has {len(ends)} ends and no tip was named",
-            where=tree.where,
-            remedy=f"name one: {shown}",
-        )
-    return base, ends[0] if ends else base
+    notes = []
+    if tip is None:
+        tip, note = infer_tip(tree, base or tree.root, joints)
+        notes += [note] if note else []
+    if base is None:
+        base, note = _base_above(tree, tip)
+        notes += [note] if note else []
+    return base, tip, notes
+
+
+def _base_above(tree: Tree, tip: str) -> tuple[str, str]:
+    """The root, or the first link beyond a joint that floats, where something still moves the tip from there."""
+    line = tree.line_to_root(tip)
+    for i, link in enumerate(line[:-1]):
+        joint = tree.above[link]
+        if joint.kind is Kind.OTHER:
+            beyond = [place for place in line[: i + 1] if place not in tree.hidden]
+            if not any(tree.above[place].kind in (Kind.TURNS, Kind.SLIDES) for place in line[:i]):
+                break
+            return beyond[-1], f"no base was named: took {beyond[-1]}, for {joint.label} above it can't be commanded"
+    return tree.root, ""
 
 
 def _path(tree: Tree, base: str, tip: str) -> list[_Step]:
@@ -188,6 +221,8 @@ def _chosen(readings: _Readings, movers: list[str], joints: Sequence[str]) -> li
         if name not in movers:
             rule = readings.motion(name).follows
             why = f"follows {rule.leader!r}" if rule else "does not move the tip"
+            if readings.motion(name).still:
+                why = "has the limits 0 to 0"
             raise BadInput(f"joint {name!r} {why}", where=where, remedy=known)
     return [name for name in movers if name in joints]
 
