@@ -182,9 +182,8 @@ def _only(shape: _Shape, end: str) -> Tip:
     extra = ", ".join(name for name in movers if name not in arm)
     if not arm or not extra:
         return Tip(end)
-    return Tip(
-        end, f"no tip was named: took the only end {end}; the gripper's own {extra} counts as a joint of the arm"
-    )
+    counts = f"the gripper's joint {extra} counts as the arm's, leave it out with --joints"
+    return Tip(end, f"no tip was named: took {end}, the only end; {counts}")
 
 
 def _leaves(shape: _Shape) -> list[str]:
