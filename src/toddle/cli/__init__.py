@@ -80,6 +80,7 @@ def _dispatch(words: list[str]) -> int:
     if words[0] not in COMMANDS:
         raise unknown_name("command", words[0], COMMANDS)
     use_compile_cache()
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # for matrices as small as these a second thread only waits
     return importlib.import_module(f"toddle.cli.{words[0]}").main(words[1:])
 
 

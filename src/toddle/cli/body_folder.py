@@ -32,7 +32,7 @@ def _draw(folder: Path, skill: BodySkill) -> None:
     """The pictures of a run."""
     from toddle.outside import body_pictures, pictures
 
-    title = f"{skill.source.spec.rsplit('/')[-1]}, {skill.fit.kind}"
+    title = f"{skill.source.called}, {skill.fit.kind}"
     home = skill.fit.model.forward(skill.home[None])[0]
     pictures.explored_space(
         folder / "explored.png", skill.experience.x[:_SHOWN], home, title=f"{title}: where the tip was seen"

@@ -45,6 +45,7 @@ def learn(asked: Reach) -> int:
     refuse_used(asked.out)
     refuse_files(asked)
     body = load_choice(source)
+    tell_notes(body, source.called)
     if asked.propose is not None:
         from toddle.cli.reach_export import propose_first
 
@@ -118,6 +119,12 @@ def work_of(asked: Reach, body: Body, plant: str, movements: int) -> Work | None
     return work_plan(asked.damage, body, movements, body.carriers if isinstance(body, Chain) else {})
 
 
+def tell_notes(body: Body, spec: str) -> None:
+    """Say what was inferred about a robot from its file."""
+    for note in getattr(body, "notes", ()):
+        print(f"{spec}: {note}", file=sys.stderr)
+
+
 def refuse_files(asked: Reach) -> None:
     """Refuse to write over a file, into a folder that isn't there, or in a format that there isn't."""
     for path in asked.to or ():
@@ -154,7 +161,7 @@ def _run(
     facts = {"choice": asdict(source), "how": how}
 
     def tell(news: str) -> None:
-        print(f"{source.spec}: {news}", file=sys.stderr)
+        print(f"{source.called}: {news}", file=sys.stderr)
 
     if isinstance(robot, Body):  # its movements cost nothing: no folder before they are known to be worth one
         experience, stopped = gather(robot, to_do.q, to_do.sight, config.seed), False

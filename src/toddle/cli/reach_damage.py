@@ -39,7 +39,7 @@ def go_on_working(skill: BodySkill, body: Body, work: Work, folder: Path) -> dic
         for step in working(skill, body, work):
             steps.append(step)
             if step.news:
-                print(f"{skill.source.spec}: movement {step.movement}: {step.news}", file=sys.stderr)
+                print(f"{skill.source.called}: movement {step.movement}: {step.news}", file=sys.stderr)
             if stop.asked:
                 break
     course = [
@@ -61,7 +61,7 @@ def go_on_working(skill: BodySkill, body: Body, work: Work, folder: Path) -> dic
         folder / "damage.png",
         np.array([step.error for step in shown]),
         sorted(happened + noticed),
-        title=f"{skill.source.spec.rsplit('/')[-1]}: error over movements, from movement {start + 1} on",
+        title=f"{skill.source.called}: error over movements, from movement {start + 1} on",
     )
     return figures
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 from toddle.cli.body_folder import leave
 from toddle.cli.reach import Reach
-from toddle.cli.reach_body import after, refuse_files
+from toddle.cli.reach_body import after, refuse_files, tell_notes
 from toddle.cli.run_folder import new_folder, refuse_used, tell_figures
 from toddle.failures import BadInput
 
@@ -28,9 +29,11 @@ def learn_from_log(asked: Reach) -> int:
     described = load_choice(source) if asked.robot is not None else None
     if described is not None and not isinstance(described, Chain):
         raise BadInput("a soft arm has no links to correct", where=source.spec, remedy="give --no-model")
+    if described is not None:
+        tell_notes(described, source.called)
     wanted = described.joints if described is not None else asked.joints
     log = read_movements(log_path or "", wanted)
-    name = source.spec or str(log_path)
+    name = source.called or Path(log_path or "").stem
 
     def tell(news: str) -> None:
         print(f"{name}: {news}", file=sys.stderr)

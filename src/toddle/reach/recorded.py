@@ -127,7 +127,7 @@ def _told(skill: BodySkill, fold: Callable[[Experience], Callable[[np.ndarray], 
     targets = skill.experience.x[tame]
     solver = skill.solver
     figures = {
-        "robot": skill.source.spec or "recorded",
+        "robot": skill.source.called or "recorded",
         "method": skill.fit.kind,
         "why": skill.why,
         "samples": len(errors),

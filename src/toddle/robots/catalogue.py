@@ -27,6 +27,11 @@ class Choice:
     base: str | None = None
     joints: Sequence[str] | None = None
 
+    @property
+    def called(self) -> str:
+        """A short name: a file's without its folder."""
+        return Path(self.spec).stem if Path(self.spec).suffix else self.spec
+
 
 @dataclass(frozen=True)
 class Robot:

@@ -85,7 +85,7 @@ def _about(skill: BodySkill) -> dict[str, object]:
     """What was learned, from what."""
     config, fit = skill.config, skill.fit
     return {
-        "robot": skill.source.spec,
+        "robot": skill.source.called,
         "method": fit.kind,
         "why": skill.why,
         "samples": len(skill.experience.q),
