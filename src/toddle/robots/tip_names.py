@@ -26,7 +26,7 @@ _SENSOR = _each(
 _TURNED = _each("roll pitch yaw pan lift flex rotate rotation swivel wrist")
 """Words of a joint's name that make it one of the arm's, even where it is the gripper's or the hand's."""
 
-_FINGERS = ("finger", "thumb", "index", "pinky", "knuckle", "phalanx", "metacarp", "jaw", "claw")
+_FINGERS = ("finger", "fngr", "thumb", "index", "pinky", "knuckle", "phalanx", "metacarp", "jaw", "claw")
 _FINGERS_OF_HANDS = _each("middle medium ring little")
 _TOOL = ("tcp", "grasp", "pinch", "tool", "eef", "ee", "effector", "attachment")
 _HAND = _each("hand palm gripper grip gripperframe")
