@@ -144,7 +144,7 @@ def tell_figures(skill: Skill | BodySkill, folder: Path, *, as_json: bool) -> No
 
 def _figure(value: object) -> str:
     if isinstance(value, float):
-        return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.2f}"
+        return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.2f}" if abs(value) >= 0.1 else f"{value:.2g}"
     if isinstance(value, Mapping):
         return ", ".join(f"{name} {_figure(inner)}" for name, inner in value.items())
     if isinstance(value, list | tuple):

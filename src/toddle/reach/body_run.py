@@ -105,11 +105,11 @@ def skill_from(
 ) -> BodySkill:
     """The skill that movements lead to, not yet tested."""
     known = to_do.known
-    fit, fits = fit_body(experience, known, to_do.names, to_do.config.seed, tell)
+    fit, sound = fit_body(experience, known, to_do.names, to_do.config.seed, tell)
     space = experience.x.shape[1]
     return BodySkill(
         source, known.joints, known.lower, known.upper, known.home, replace(to_do.config, method=fit.kind),
-        f"{to_do.why}: {fits}", fit, experience, np.empty((0, space)), np.empty(0), {},
+        to_do.why, fit, sound, experience, np.empty((0, space)), np.empty(0), {},
     )  # fmt: skip
 
 

@@ -45,8 +45,9 @@ class BodySkill:
         upper: upper limits [rad or m].
         home: where learning started [rad or m].
         config: how it was learned.
-        why: which structure was taken, and why.
+        why: why this structure was tried.
         fit: the model, and how it sits in the movements.
+        sound: whether its structure fits: what it misses can't be told from noise.
         experience: the movements.
         targets: the fixed test set [m], never learned from.
         errors: open-loop error on each of its points [m]; empty where nobody could test.
@@ -61,6 +62,7 @@ class BodySkill:
     config: BodyConfig
     why: str
     fit: Fit
+    sound: bool
     experience: Experience
     targets: Float[np.ndarray, "points space"]
     errors: Float[np.ndarray, " tested"]
@@ -74,11 +76,12 @@ class BodySkill:
     @cached_property
     def expectation(self) -> Expectation:
         """How far from the target its answers end."""
-        shown, count = len(self.fit.miss), len(self.experience.q)
-        if shown == count:
-            return Expectation.of(self.fit, self.experience, sensor=self.config.noise)
-        held = part(self.experience, shown, count)
-        return Expectation.held_out(self.fit.model, held, sensor=self.config.noise)
+        shown, count, noise = len(self.fit.miss), len(self.experience.q), self.config.noise
+        if shown < count:
+            return Expectation.held_out(self.fit.model, part(self.experience, shown, count), sensor=noise)
+        # where the structure fits, noise is what it was found to be: no chance excess of it is the body's
+        sensor = max(noise or 0.0, self.fit.sensor) if self.sound else noise
+        return Expectation.of(self.fit, self.experience, sensor=sensor)
 
     @cached_property
     def typical(self) -> float:

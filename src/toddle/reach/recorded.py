@@ -98,6 +98,7 @@ def _corrected(
     """The description, corrected; None where it is so wrong that the movements tell more alone."""
     from toddle.reach.model.corrected import correct
     from toddle.reach.model.corrected_changes import report
+    from toddle.reach.model.misfit import fits
 
     nominal = linkage_of(described)
 
@@ -113,7 +114,7 @@ def _corrected(
     empty = np.empty((0, experience.x.shape[1]))
     skill = BodySkill(
         source, known.joints, known.lower, known.upper, known.home, replace(config, method="corrected"),
-        "its description, corrected by the movements", result.fit, experience, empty, np.empty(0), {},
+        "its description, corrected by the movements", result.fit, fits(experience, result.fit), experience, empty, np.empty(0), {},
     )  # fmt: skip
     return Recorded(_told(skill, lambda shown: corrected(shown).fit.model.forward), report(result.changes))
 
@@ -130,6 +131,7 @@ def _told(skill: BodySkill, fold: Callable[[Experience], Callable[[np.ndarray], 
         "robot": skill.source.called or "recorded",
         "method": skill.fit.kind,
         "why": skill.why,
+        "structure_fits": skill.sound,
         "samples": len(errors),
         "movements": len(errors),
         "seed": skill.config.seed,

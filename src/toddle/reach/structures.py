@@ -143,7 +143,7 @@ def _shown(experience: Experience, structure: Structure) -> Experience:
     return part(experience, 0, count - max(10, count // 10)) if structure.tests_itself else experience
 
 
-def fit_body(experience: Experience, known: Known, names: tuple[str, ...], seed: int, tell: Tell) -> tuple[Fit, str]:
+def fit_body(experience: Experience, known: Known, names: tuple[str, ...], seed: int, tell: Tell) -> tuple[Fit, bool]:
     """The first structure that fits; the one that misses least where none does.
 
     Args:
@@ -154,7 +154,7 @@ def fit_body(experience: Experience, known: Known, names: tuple[str, ...], seed:
         tell: called with what is found on the way.
 
     Returns:
-        The fit, and how well its structure fits, as a sentence.
+        The fit, and whether what it misses can't be told from noise.
 
     Raises:
         BadInput: the movements can't be learned from.
@@ -173,10 +173,10 @@ def fit_body(experience: Experience, known: Known, names: tuple[str, ...], seed:
             refused.append(fault)
             continue
         if fits(shown, fit):
-            return fit, f"{fit.kind} fits"
+            return fit, True
         typical = float(np.median(fit.miss))
         tell(f"{fit.kind} doesn't fit: it misses by {1000 * typical:.1f} mm (median), more than noise would")
         tried.append((typical, fit))
     if not tried:
         raise refused[0]
-    return min(tried, key=lambda pair: pair[0])[1], f"{'none' if len(names) > 1 else 'it'} fits"
+    return min(tried, key=lambda pair: pair[0])[1], False

@@ -88,6 +88,7 @@ def _about(skill: BodySkill) -> dict[str, object]:
         "robot": skill.source.called,
         "method": fit.kind,
         "why": skill.why,
+        "structure_fits": skill.sound,
         "samples": len(skill.experience.q),
         "movements": len(skill.experience.q),
         "seed": config.seed,
