@@ -112,9 +112,10 @@ def _corrected(
         tell("so the body is learned from nothing")
         return None
     empty = np.empty((0, experience.x.shape[1]))
+    sound = fits(experience, result.fit)
     skill = BodySkill(
         source, known.joints, known.lower, known.upper, known.home, replace(config, method="corrected"),
-        "its description, corrected by the movements", result.fit, fits(experience, result.fit), experience, empty, np.empty(0), {},
+        "its description, corrected by the movements", result.fit, sound, experience, empty, np.empty(0), {},
     )  # fmt: skip
     return Recorded(_told(skill, lambda shown: corrected(shown).fit.model.forward), report(result.changes))
 

@@ -72,7 +72,7 @@ def load(
     Args:
         spec: a name of the catalogue, ``planar:N``, the path of a URDF or MJCF file, or a name of the package
             robot_descriptions where that is installed.
-        tip: the link (or site) whose position is reported; None: the only end of the robot.
+        tip: the link (or site) whose position is reported; None: the end of its arm, inferred and told in its notes.
         base: the link in whose frame it is reported; None: the root.
         joints: names of the actuated joints, the others are held; None: every joint that moves the tip.
 
