@@ -8,10 +8,10 @@ then 256 targets, the tips of random postures; true distances after 0 to 6 looks
 (Gaussian, each axis). Other bodies: random soft arms of 2 to 4 segments of 2 to 4 actuators, all of their layout
 unknown; and arms whose curvature isn't constant (taper 0.3, nonlinear 0.15, sag 0.3 rad/m, see `soft_variants`).
 Circle: the paper's, radius 0.2 m, 0.7 m above the base, twice 100 points, from home; one movement for each point, and a
-look with 2 mm noise after it. At a random time of the next round the last three actuators lock where they stand, and
-nobody tells; when a look is a surprise, each actuator is probed once, and the circle goes on, twice more. Points that
-the true arm as it is now can't reach to 0.5 mm are counted and left out. Damage: random sets of actuators lock, weaken
-or slip at random postures; looks with 2 mm noise.
+look with 2 mm noise after it, from which the arm goes on learning. At a random time of the next round the last three
+actuators lock where they stand, and nobody tells; when a look is a surprise, each actuator is probed once, and the
+circle goes on, twice more. Points that the true arm as it is now can't reach to 0.5 mm are counted and left out.
+Damage: random sets of actuators lock, weaken or slip at random postures; looks with 2 mm noise.
 """
 
 from __future__ import annotations
@@ -34,20 +34,21 @@ import numpy as np  # noqa: E402
 import toddle  # noqa: E402
 from toddle.outside.versions import versions  # noqa: E402
 from toddle.reach.model.crippled import Crippled  # noqa: E402
-from toddle.reach.model.curvature import fit_curvature  # noqa: E402
+from toddle.reach.model.curvature import Curvature, fit_curvature  # noqa: E402
+from toddle.reach.model.curvature_update import updated  # noqa: E402
 from toddle.reach.model.damage_watch import JUMP, surprises  # noqa: E402
 from toddle.reach.model.misfit import fits  # noqa: E402
-from toddle.reach.model.model import Fit, Model  # noqa: E402
+from toddle.reach.model.model import Fit  # noqa: E402
 from toddle.reach.model.soft_damage import Diagnosis, diagnose, probe_movements  # noqa: E402
 from toddle.reach.solve.gauss_newton import solve_model  # noqa: E402
-from toddle.reach.solve.looking import Looks, aimed, begun, correct, seen  # noqa: E402
+from toddle.reach.solve.looking import aimed, begun, correct  # noqa: E402
 from toddle.reach.solve.solver import ModelSolver  # noqa: E402
 from toddle.robots.body import Body  # noqa: E402
 from toddle.robots.soft_variants import bha_variant, random_soft_arm  # noqa: E402
 from toddle.signals import Experience  # noqa: E402
 
 TARGETS, LOOKS, LOOK_NOISE, REACHABLE = 256, 6, 2e-3, 5e-4
-REMEMBERED = 8  # looks along the circle
+STUCK = 1e-4  # [m] farther from a point than that, the arm looks for another posture
 Row = dict[str, Any]
 
 
@@ -145,36 +146,35 @@ def circle() -> np.ndarray:
 
 
 class Follower:
-    """Goes from point to point, looks after each movement, and keeps the last looks."""
+    """Goes from point to point, looks after each movement, and learns from it what its model is."""
 
-    def __init__(self, arm: Arm, model: Model, known: Experience, q: np.ndarray) -> None:
-        self._arm, self.model, self._known, self.q = arm, model, known, q
-        self._looks = self._none(q)
-
-    def _none(self, q: np.ndarray) -> Looks:
-        return begun(self.model, q[None], LOOK_NOISE, self._arm.lower, self._arm.upper)
+    def __init__(self, arm: Arm, body: Curvature | Crippled, known: Experience, q: np.ndarray) -> None:
+        self._arm, self._begun, self.model, self._known, self.q = arm, body, body, known, q
+        self._since: list[tuple[np.ndarray, np.ndarray]] = []
 
     def aim(self, target: np.ndarray) -> np.ndarray:
         """Where to go for a target, from here."""
         lower, upper = self._arm.lower, self._arm.upper
-        kept = self._looks._replace(q=self._looks.q[:, -REMEMBERED:], missed=self._looks.missed[:, -REMEMBERED:])
-        self._looks = kept
-        from_here = aimed(kept, self.model, target[None], self.q[None], lower, upper)
-        if np.linalg.norm(self.model.forward(from_here)[0] - target) > 0.02:  # stuck: another posture
+        nothing = begun(self.model, self.q[None], LOOK_NOISE, lower, upper)
+        from_here = aimed(nothing, self.model, target[None], self.q[None], lower, upper)
+        if np.linalg.norm(self.model.forward(from_here)[0] - target) > STUCK:  # another posture
             memory = (self._known.q, self.model.forward(self._known.q))
-            other = solve_model(self.model, target[None], lower, upper, memory=memory, near=self.q, starts=24)
-            from_here = aimed(kept, self.model, target[None], other.q, lower, upper)
+            found = solve_model(self.model, target[None], lower, upper, memory=memory, near=self.q, starts=24)
+            from_here = found.q
         return from_here[0]
 
     def saw(self, q: np.ndarray, x: np.ndarray) -> None:
-        """Remember a look."""
+        """Learn from a look."""
         self.q = q
-        self._looks = seen(self._looks, self.model, q[None], x[None])
+        self._since.append((q, x))
+        every, tips = (np.stack(each) for each in zip(*self._since, strict=True))
+        self.model = updated(self._begun, Experience(every, tips), LOOK_NOISE)
 
 
 def followed(arm: Arm, fit: Fit, known: Experience, seed: int) -> Row:
     """The circle with the whole arm; the locks, noticed or not; the circle with what is left [mm]."""
     rng, points = np.random.default_rng([seed, 7]), circle()
+    assert isinstance(fit.model, Curvature)
     follower = Follower(arm, fit.model, known, arm.home)
     free, told = [], known.q[0] * np.nan
 
@@ -199,14 +199,14 @@ def followed(arm: Arm, fit: Fit, known: Experience, seed: int) -> Row:
         x = go(q)
         unaware.append(1e3 * np.linalg.norm(x - target))
         watched = look(x)
-        alarm = bool(surprises(fit.model, q[None], watched[None], LOOK_NOISE)[0] > JUMP)
-        follower.saw(q, watched)
+        alarm = bool(surprises(follower.model, q[None], watched[None], LOOK_NOISE)[0] > JUMP)
         if alarm:
-            noticed = moved + 1
+            noticed, follower.q = moved + 1, q
             break
+        follower.saw(q, watched)
     probes = np.concatenate([follower.q[None], probe_movements(follower.q, arm.lower, arm.upper)])
     tips = np.stack([look(go(q)) for q in probes])
-    found = diagnose(fit.model, Experience(probes, tips), arm.lower, arm.upper, LOOK_NOISE)
+    found = diagnose(follower.model, Experience(probes, tips), arm.lower, arm.upper, LOOK_NOISE)
     follower = Follower(arm, found.model, known, probes[-1])
     locked = [_distance(follower, go, look, target) for target in points]
     can = _reachable(arm, told, points, known)
