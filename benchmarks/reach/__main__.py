@@ -1,6 +1,6 @@
 """This project's inverse kinematics beside its peers: one run, one thread, the same bodies and targets.
 
-    python -m benchmarks.reach                           # all bodies and peers: about six minutes
+    python -m benchmarks.reach                           # all bodies and peers: about seven minutes
     python -m benchmarks.reach --bodies panda --peers toddle mink --out runs/reach.json
     python -m benchmarks.reach report                    # only the tables of docs/peers.md
 
@@ -37,12 +37,12 @@ def main() -> None:
     parser.add_argument("what", nargs="?", choices=("run", "report"), default="run")
     parser.add_argument("--bodies", nargs="+", choices=tuple(BODIES), default=tuple(BODIES))
     parser.add_argument("--peers", nargs="+", choices=PEERS, default=PEERS)
-    parser.add_argument("--targets", type=int, default=Plan().count)
+    parser.add_argument("--targets", type=int, default=Plan().targets)
     parser.add_argument("--seed", type=int, default=Plan().seed)
     parser.add_argument("--out", type=Path, default=RESULT)
     asked = parser.parse_args()
     if asked.what == "run":
-        run(asked.bodies, asked.peers, Plan(count=asked.targets, seed=asked.seed), asked.out)
+        run(asked.bodies, asked.peers, Plan(targets=asked.targets, seed=asked.seed), asked.out)
     if asked.out == RESULT:
         write_report(RESULT, ROOT / "docs" / "peers.md")
 

@@ -23,7 +23,7 @@ class Asked:
         settings = {**os.environ, **{f"{name}_NUM_THREADS": "1" for name in THREADS}, "PYTHONPATH": ""}
         self.peer = peer
         self.process = subprocess.Popen(
-            [str(python), "-m", f"benchmarks.reach.peers.{peer}"],
+            [str(python), "-m", f"benchmarks.reach.peers.with_{peer}"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

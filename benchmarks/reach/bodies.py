@@ -16,11 +16,12 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from toddle.robots.chain import Chain
-from toddle.robots.linkage import Linkage, linkage_of
-from toddle.robots.markup import parse, read_bytes
+from toddle.robots.frames import from_rpy, transform, turning_z_to
+from toddle.robots.linkage import Linkage
+from toddle.robots.markup import numbers, parse, read_bytes
 from toddle.robots.packages import ICUB_MODEL, ICUB_TIP
-from toddle.robots.urdf import chain_of, read_urdf
-from toddle.robots.urdf_elements import light_link, numerals, written
+from toddle.robots.urdf import read_urdf
+from toddle.robots.urdf_elements import light_link, written
 
 
 class Source(NamedTuple):
@@ -66,7 +67,7 @@ class Body:
         text: its URDF.
         base, tip: links at its two ends.
         joints: those that move, base first.
-        linkage: its constants in float64, by which answers are scored.
+        linkage: its constants, by which targets are made and answers scored.
         lower, upper: limits [rad or m].
         posed: whether targets say how the tip is turned.
     """
@@ -88,24 +89,50 @@ def body(name: str) -> Body:
     path = _icub() if source.file == "icub" else Path(sys.prefix, *_DATA, source.file)
     whole = read_urdf(path, tip=source.tip, base=source.base, joints=source.joints)
     robot, base = plain(parse(read_bytes(path), str(path)), whole, source.tip, source.base)
-    text = written(robot)
-    chain = chain_of(parse(text.encode(), name), name, tip=source.tip, base=None, joints=None)
-    lower, upper = np.asarray(chain.lower, float), np.asarray(chain.upper, float)
-    return Body(name, text, base, source.tip, chain.joints, linkage_of(chain), lower, upper, source.posed)
+    moving = [joint for joint in robot.iter("joint") if joint.get("type") != "fixed"]
+    limits = np.array([[float(limit.attrib[end]) for end in ("lower", "upper")] for limit in robot.iter("limit")])
+    names = tuple(joint.attrib["name"] for joint in moving)
+    return Body(
+        name, written(robot), base, source.tip, names, constants(robot), limits[:, 0], limits[:, 1], source.posed
+    )
+
+
+def constants(robot: Element) -> Linkage:
+    """The constants of a plain arm in double precision; a `Chain` has them in single, too coarse for exact solvers."""
+    frame, before, slides = np.eye(4), [], []
+    for joint in robot.iter("joint"):
+        origin = joint.find("origin")
+        if origin is not None:
+            frame = frame @ transform(
+                from_rpy(_three(origin, "rpy", (0.0, 0.0, 0.0))), _three(origin, "xyz", (0.0, 0.0, 0.0))
+            )
+        if joint.get("type") == "fixed":
+            continue
+        axis = joint.find("axis")
+        along = np.array([1.0, 0.0, 0.0]) if axis is None else _three(axis, "xyz", (1.0, 0.0, 0.0))
+        tilt = transform(turning_z_to(along), np.zeros(3))
+        before.append(frame @ tilt)
+        slides.append(float(joint.get("type") == "prismatic"))
+        frame = tilt.T
+    return Linkage(np.array(before), np.array(slides), np.eye(len(before)), np.zeros(len(before)), frame)
+
+
+def _three(element: Element, attribute: str, default: tuple[float, ...]) -> np.ndarray:
+    return np.array(numbers(element, attribute, default, ""), float)
 
 
 def plain(robot: Element, chain: Chain, tip: str, base: str | None) -> tuple[Element, str]:
     """The path to the tip alone, as a URDF, and the link that it starts from."""
-    limits = dict(zip(chain.joints, zip(np.asarray(chain.lower), np.asarray(chain.upper), strict=True), strict=True))
+    moved = set(chain.joints)
     parts, link = [light_link(tip)], tip
     while link != base and (joint := _above(robot, link)) is not None:
         name, parent = joint.attrib["name"], joint.find("parent")
         assert parent is not None, name
-        copy = Element("joint", name=name, type=_kind(joint) if name in limits else "fixed")
+        copy = Element("joint", name=name, type=_kind(joint) if name in moved else "fixed")
         copy.extend(part for part in joint if part.tag in ("parent", "child", "origin"))
-        if name in limits:
+        if name in moved:
             copy.extend(part for part in joint if part.tag == "axis")
-            lower, upper = (numerals(np.array([limit])) for limit in limits[name])
+            lower, upper = _limits(joint)
             SubElement(copy, "limit", lower=lower, upper=upper, effort="100.0", velocity="10.0")
         link = parent.attrib["link"]
         parts += [copy, light_link(link)]
@@ -120,6 +147,13 @@ def _above(robot: Element, link: str) -> Element | None:
         if child is not None and child.get("link") == link:
             return joint
     return None
+
+
+def _limits(joint: Element) -> tuple[str, str]:
+    limit = joint.find("limit")
+    if joint.get("type") == "continuous" or limit is None:
+        return repr(-np.pi), repr(np.pi)
+    return limit.attrib["lower"], limit.attrib["upper"]
 
 
 def _kind(joint: Element) -> str:

@@ -61,7 +61,7 @@ def _commands(peer: str, folder: Path, python: Path) -> list[list[str]]:
     folder.parent.mkdir(parents=True, exist_ok=True)
     if uv is None or peer in BY_PIP:
         return [
-            [sys._base_executable, "-m", "venv", str(folder)],
+            [sys.executable, "-m", "venv", str(folder)],
             [str(python), "-m", "pip", "install", "--quiet", *PACKAGES[peer]],
         ]
     return [

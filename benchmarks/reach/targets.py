@@ -34,14 +34,14 @@ def reached(
     """Which answers put the tip within 1 mm and 0.01 rad of the target, inside the limits; None is no answer."""
     given = np.array([answer is not None and len(answer) == len(body.lower) for answer in answers], bool)
     q = np.array([answer if had else body.lower for answer, had in zip(answers, given, strict=True)], float)
-    finite = np.isfinite(q).all(axis=1)
-    q = np.where(finite[:, None], q, body.lower)
+    given &= np.isfinite(q.sum(axis=1))
+    q = np.where(np.isfinite(q), q, body.lower)
     pose = poses(body.linkage, q)
-    near = np.linalg.norm(pose[:, :3, 3] - aims[:, :3, 3], axis=1) < DISTANCE
+    near = np.less(np.linalg.norm(pose[:, :3, 3] - aims[:, :3, 3], axis=1), DISTANCE)
     if body.posed:
-        near &= angles(pose, aims) < ANGLE
+        near = near & (angles(pose, aims) < ANGLE)
     inside = ((q >= body.lower - SLACK) & (q <= body.upper + SLACK)).all(axis=1)
-    return given & finite & near & inside
+    return given & near & inside
 
 
 def angles(one: Float[np.ndarray, "count 4 4"], other: Float[np.ndarray, "count 4 4"]) -> Float[np.ndarray, " count"]:

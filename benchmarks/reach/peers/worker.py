@@ -139,7 +139,8 @@ def batched(peer: Peer, asked: dict[str, Any]) -> dict[str, Any]:
 def loaded(make: Callable[[Job], Peer], asked: dict[str, Any]) -> tuple[Job, Peer, dict[str, Any]]:
     """The solver of an arm, warm: what is made at the first call is made."""
     arrays = ("lower", "upper", "before", "slides", "gain", "offset", "last")
-    job = Job(**{name: np.array(value) if name in arrays else value for name, value in asked["job"].items()})
+    told: dict[str, Any] = {name: np.array(v) if name in arrays else v for name, v in asked["job"].items()}
+    job = Job(**told)
     began = time.perf_counter()
     peer = make(job)
     rng, warm = np.random.default_rng(0), time.perf_counter()
@@ -167,7 +168,8 @@ def serve(make: Callable[[Job], Peer], packages: Sequence[str]) -> None:
             elif asked["do"] == "load":
                 job, peer, reply = loaded(make, asked)
             else:
-                assert job is not None and peer is not None
+                assert job is not None
+                assert peer is not None
                 reply = solved(job, peer, asked) if asked["do"] == "solve" else batched(peer, asked)
         except Exception as error:
             reply = {"refused": f"{type(error).__name__}: {error}".splitlines()[0][:300]}

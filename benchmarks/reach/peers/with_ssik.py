@@ -1,9 +1,10 @@
-"""ssik: analytical inverse kinematics for arms of six and seven revolute joints, by the solver that it builds for one."""
+"""ssik: analytical inverse kinematics for six or seven revolute joints, by the solver that it builds for an arm."""
 
 # pyright: reportMissingImports=false
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import subprocess
 import sys
@@ -34,7 +35,8 @@ def peer(job: Job) -> Peer:
 
 def built(job: Job) -> ModuleType:
     """The module that `ssik build` writes for an arm, kept for the next run."""
-    path = Path(job.folder) / f"{Path(job.urdf).stem}_ik.py"
+    urdf = Path(job.urdf)
+    path = Path(job.folder) / f"{urdf.stem}_{hashlib.sha256(urdf.read_bytes()).hexdigest()[:12]}_ik.py"
     if not path.exists():
         command = [sys.executable, "-m", "ssik.cli", "build", job.urdf, "--base", job.base, "--ee", job.tip]
         command += ["--validate-poses", "20", "--out", str(path)]
@@ -47,7 +49,8 @@ def built(job: Job) -> ModuleType:
             said = (done.stderr or done.stdout).strip().splitlines() or [""]
             raise Refused(f"`ssik build` failed: {said[-1][:200]}")
     spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

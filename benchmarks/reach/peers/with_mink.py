@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.reach.peers.worker import STOP, Job, Peer, serve
 
-STEPS, DAMPING = 100, 1e-3
+STEPS, DAMPING = 20, 1e-3
 
 
 def peer(job: Job) -> Peer:

@@ -9,7 +9,7 @@ import placo
 
 from benchmarks.reach.peers.worker import STOP, Job, Peer, serve
 
-STEPS = 100
+STEPS = 20
 
 
 def peer(job: Job) -> Peer:

@@ -11,7 +11,7 @@ from pink.limits import ConfigurationLimit
 
 from benchmarks.reach.peers.worker import STOP, Job, Peer, Refused, serve
 
-STEPS = 100
+STEPS = 20
 
 
 def peer(job: Job) -> Peer:
@@ -20,7 +20,7 @@ def peer(job: Job) -> Peer:
         raise Refused("it read other joints than the file has")
     order = [model.joints[model.getJointId(name)].idx_q for name in job.joints]
     task = pink.tasks.FrameTask(job.tip, position_cost=1.0, orientation_cost=float(job.posed), lm_damping=1e-2)
-    limits = [ConfigurationLimit(model, config_limit_gain=0.95)]
+    limits = [ConfigurationLimit(model, config_limit_gain=0.5)]
     data = model.createData()
 
     def attempt(aim: np.ndarray, start: np.ndarray | None) -> np.ndarray:
@@ -38,7 +38,7 @@ def peer(job: Job) -> Peer:
             configuration.integrate_inplace(velocity, 1.0)
         return configuration.q[order]
 
-    return Peer(attempt, f"FrameTask (lm_damping 0.01), ConfigurationLimit (gain 0.95), DAQP, {STEPS} steps at most")
+    return Peer(attempt, f"FrameTask (lm_damping 0.01), ConfigurationLimit (gain 0.5), DAQP, {STEPS} steps at most")
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ def peer(job: Job) -> Peer:
         raise Refused("its forward kinematics of the file is another one")
     limits = torch.as_tensor(np.stack([job.lower, job.upper], axis=1))
 
-    def solver(starts: torch.Tensor) -> object:
+    def solver(starts: torch.Tensor) -> pytorch_kinematics.PseudoInverseIK:
         return pytorch_kinematics.PseudoInverseIK(
             chain,
             pos_tolerance=5e-4,

@@ -31,9 +31,7 @@ def peer(job: Job) -> Peer:
 
     def attempt(aim: np.ndarray, start: np.ndarray | None) -> np.ndarray:
         q0 = spread(job.middle if start is None else start)
-        whole = chain.inverse_kinematics_frame(
-            aim, initial_position=q0, orientation_mode="all" if job.posed else None
-        )
+        whole = chain.inverse_kinematics_frame(aim, initial_position=q0, orientation_mode="all" if job.posed else None)
         return np.asarray(whole)[places]
 
     return Peer(attempt, "inverse_kinematics_frame, defaults, orientation_mode 'all'" if job.posed else "defaults")

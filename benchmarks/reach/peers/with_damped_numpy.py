@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.reach.peers.worker import STOP, Job, Peer, serve
 
-DAMPING, STEPS = 0.05, 100
+DAMPING, STEPS = 0.05, 30
 
 
 def jacobian(job: Job, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
