@@ -157,7 +157,8 @@ def _run(
     from toddle.reach.gather import gather
     from toddle.robots.body import Body
 
-    to_do = plan(robot, config, like=body)
+    longer = made if made is not None and len(made.q) < (config.movements or 0) and asked.samples is not None else None
+    to_do = plan(robot, config, like=body, made=longer)
     facts = {"choice": asdict(source), "how": how}
 
     def tell(news: str) -> None:

@@ -13,13 +13,15 @@ from toddle.reach.body_config import BodyConfig
 from toddle.reach.body_skill import BodySkill
 from toddle.reach.evaluate.body_figures import figures_of
 from toddle.reach.evaluate.targets import fixed_targets
+from toddle.reach.explore.isolating import isolating_movements
+from toddle.reach.explore.outward import outward_movements
 from toddle.reach.gather import Sight, gather, postures, truth
 from toddle.reach.structures import Known, fit_body, structure_named, suited
 from toddle.robots.body import Body, Plant
 from toddle.robots.catalogue import Choice, record
 from toddle.signals import Experience
 
-_SURVEY = 3  # the stream of the postures that test targets come from
+_SURVEY, _MOVEMENTS = 3, 4  # streams: of the postures that test targets come from, of movements
 _TEST_POINTS = 110  # the size of the thesis's fixed set (Mahboob 2015, section 4.2)
 _SURVEYED = 4_000
 
@@ -48,13 +50,14 @@ class Plan:
         return Sight(self.config.noise or 0.0, self.config.angle_noise, self.config.pose)
 
 
-def plan(body: Body | Plant, config: BodyConfig, *, like: Body | None = None) -> Plan:
+def plan(body: Body | Plant, config: BodyConfig, *, like: Body | None = None, made: Experience | None = None) -> Plan:
     """Settle what a run will do.
 
     Args:
         body: what moves.
         config: what was asked for.
         like: what a plant is known to be built like, where that is known.
+        made: movements of a run that was at its end and is to be made longer.
 
     Raises:
         BadInput: there is no such method.
@@ -65,7 +68,13 @@ def plan(body: Body | Plant, config: BodyConfig, *, like: Body | None = None) ->
     lower, upper, home = (np.asarray(values, float) for values in (body.lower, body.upper, body.home))
     first = structure_named(names[0])
     count = config.movements or (first.movements if len(names) == 1 else structure_named("curvature").movements)
-    q = postures(lower, upper, count, config.seed, _designed(lower, upper, home) if first.designed else None)
+    if not first.designed:
+        q = postures(lower, upper, count, config.seed)
+    elif made is None:
+        designed = isolating_movements(lower, upper, home)[:count]
+        q = np.concatenate([designed, _outward(lower, upper, count - len(designed), config.seed, 0)])
+    else:
+        q = np.concatenate([made.q, _outward(lower, upper, count - len(made.q), config.seed, len(made.q))])
     settled = replace(config, method=names[0] if len(names) == 1 else None, movements=count)
     return Plan(settled, names, why, Known(tuple(body.joints), lower, upper, home), q)
 
@@ -154,9 +163,7 @@ def _first(turns: np.ndarray | None, config: BodyConfig) -> np.ndarray | None:
     return None if turns is None else turns[: config.test_points]
 
 
-def _designed(
-    lower: Float[np.ndarray, " joints"], upper: Float[np.ndarray, " joints"], home: Float[np.ndarray, " joints"]
-) -> Float[np.ndarray, "designed joints"]:
-    from toddle.reach.explore.isolating import isolating_movements
-
-    return isolating_movements(lower, upper, home)
+def _outward(
+    lower: Float[np.ndarray, " joints"], upper: Float[np.ndarray, " joints"], count: int, seed: int, first: int
+) -> Float[np.ndarray, "count joints"]:
+    return outward_movements(lower, upper, count, np.random.default_rng([seed, _MOVEMENTS, first]))

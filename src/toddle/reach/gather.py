@@ -54,11 +54,9 @@ def postures(
     upper: Float[np.ndarray, " joints"],
     count: int,
     seed: int,
-    first: Float[np.ndarray, "designed joints"] | None = None,
 ) -> Float[np.ndarray, "count joints"]:
-    """Joint values to try: those that were designed, then uniformly random ones [rad or m]."""
-    random = np.random.default_rng([seed, _POSTURES]).uniform(lower, upper, (count, len(lower)))
-    return random if first is None else np.concatenate([first, random])[:count]
+    """Joint values to try, uniformly random [rad or m]."""
+    return np.random.default_rng([seed, _POSTURES]).uniform(lower, upper, (count, len(lower)))
 
 
 def gather(
