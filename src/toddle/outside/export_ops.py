@@ -8,7 +8,7 @@ NumPy's rules and understand ``+ - * /``, comparisons, ``&`` and ``~``. Axes cou
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -16,6 +16,7 @@ Tensor = Any  # a jax.Array, or a value of an ONNX graph
 State = tuple[Tensor, ...]
 
 
+@runtime_checkable
 class Ops(Protocol):
     """A namespace of operations."""
 

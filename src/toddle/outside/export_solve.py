@@ -17,11 +17,12 @@ from jaxtyping import Float
 
 from toddle.outside.export_ops import Ops, State, Tensor
 
-LANES, ROUNDS, STEPS = 8, 6, 14
+LANES, ROUNDS, STEPS, SETTLE = 8, 4, 14, 40
 _REACHED = 1e-5  # [m]
-_DAMPING, _LEAST = 0.02, 1e-9
+_DAMPING, _LEAST = 0.02, 1e-8
 _LIMITED = 2  # solves in a step, each without the joints that the one before would have carried past a limit
 _FAR = 1e30
+_CALMER, _BOLDER = 0.4, 10.0
 
 
 class Miss(NamedTuple):
@@ -78,14 +79,16 @@ def answered(ops: Ops, problem: Problem, *inputs: Tensor) -> dict[str, Tensor]:
     cost = ops.constant(far) - 2.0 * ops.matmul(place, ops.constant(problem.places.T))
     starts = ops.shape(ops.rows(problem.starts, cost, lanes * rounds), (rounds, lanes, joints))
     first = ops.shape(ops.take(starts, [0], 1), (lanes, joints))
-    best = first, 0.0 * ops.sum(first, -1) + _FAR
+    none = 0.0 * ops.sum(first, -1) + _FAR
 
     def descent(number: Tensor, best: State) -> tuple[State, Tensor]:
-        q = ops.at(starts, number, 1)
-        _, *found = ops.repeat(STEPS, lambda _, state: _stepped(ops, problem, goal, *state), (q, *best))
-        return tuple(found), _unsolved(ops, found[1])
+        found = _descended(ops, problem, goal, ops.at(starts, number, 1), best[1], STEPS)
+        better = (found[1] < best[1]) & _unsolved(ops, best[1])
+        best = ops.where(better, found[0], best[0]), ops.where(better, found[1], best[1])
+        return best, _unsolved(ops, best[1])
 
-    q, total = ops.repeat(rounds, descent, best)
+    q, total = ops.repeat(rounds, descent, (first, none))
+    q, total = _descended(ops, problem, goal, q, total, SETTLE, careful=True)
     level = ops.maximum(total, ops.constant(_REACHED**2))  # all that arrived are as good: the nearest start's is taken
     chosen = ops.sum(q * ops.first_least(level, lanes, 1), 1)
     end = problem.miss(ops, chosen, goal)
@@ -98,21 +101,42 @@ def _unsolved(ops: Ops, total: Tensor) -> Tensor:
     return ops.least(total, 1) > _REACHED**2
 
 
-def _stepped(ops: Ops, problem: Problem, goal: Tensor, q: Tensor, best: Tensor, least: Tensor) -> tuple[State, Tensor]:
-    """Look where the postures are, keep the best of each lane, and go on where the target isn't reached."""
-    miss = problem.miss(ops, q, goal)
-    total = miss.square + problem.lever**2 * miss.angle * miss.angle
-    better = (total < least) & _unsolved(ops, least)
-    best, least = ops.where(better, q, best), ops.where(better, total, least)
-    left = _unsolved(ops, least)
-    return (ops.where(left, _moved(ops, problem, miss, total, q), q), best, least), left
+def _descended(
+    ops: Ops, problem: Problem, goal: Tensor, q: Tensor, other: Tensor, steps: int, *, careful: bool = False
+) -> State:
+    """Postures of least error on the way down, and that error squared [m^2] (batch, lanes, 1).
+
+    Args:
+        ops, problem, goal: what is computed, and towards what.
+        q: where to start from (batch, lanes, joints).
+        other: what was come to before; where that is enough there is nothing left to do.
+        steps: at most.
+        careful: whether a step that leads up is taken back, and the next is damped more (Marquardt 1963).
+    """
+
+    def step(_: Tensor, state: State) -> tuple[State, Tensor]:
+        q, kept, least, growth = state
+        miss = problem.miss(ops, q, goal)
+        total = miss.square + problem.lever**2 * miss.angle * miss.angle
+        better = total <= least
+        kept, least = ops.where(better, q, kept), ops.where(better, total, least)
+        if careful:
+            growth = ops.where(better, ops.maximum(_CALMER * growth, ops.constant(1.0)), _BOLDER * growth)
+        onward = _moved(ops, problem, miss, growth * (_DAMPING * total + _LEAST), q)
+        if careful:
+            onward = ops.where(better, onward, kept)
+        left = _unsolved(ops, ops.minimum(least, other))
+        return (ops.where(left, onward, q), kept, least, growth), left
+
+    none = 0.0 * ops.sum(q, -1)
+    return ops.repeat(steps, step, (q, q, none + _FAR, none + 1.0))[1:3]
 
 
-def _moved(ops: Ops, problem: Problem, miss: Miss, total: Tensor, q: Tensor) -> Tensor:
+def _moved(ops: Ops, problem: Problem, miss: Miss, damping: Tensor, q: Tensor) -> Tensor:
     """The postures after a damped step within the limits."""
     lower, upper, scale = (ops.constant(part[None, None]) for part in (problem.lower, problem.upper, problem.scale))
     lanes, joints = min(LANES, len(problem.starts)), len(problem.scale)
-    damping = ops.shape(_DAMPING * total + _LEAST, (lanes, 1, 1))
+    damping = ops.shape(damping, (lanes, 1, 1))
     error, slope, held = miss.error, miss.slope, 0.0 * q
     for _ in range(_LIMITED - 1):
         aim = q + _step(ops, problem, error, slope, damping) * scale
