@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import functools
 from dataclasses import replace
+from typing import Any
 
 import jax
 import numpy as np
 
 import toddle
-from toddle.reach.api import Options
 from toddle.reach.config import ReachConfig
 from toddle.reach.methods import make_learner
 from toddle.reach.session import Cycle, Session, cycles, open_session, start
 from toddle.reach.skill import Skill
 from toddle.robots.planar import planar
 
-SIZES: Options = {"samples": 400, "per_cycle": 100, "hidden": (4,), "test_points": 20}
+SIZES: dict[str, Any] = {"samples": 400, "per_cycle": 100, "hidden": (4,), "test_points": 20}
 
 ARM = """\
 <robot name="post">
@@ -50,16 +50,24 @@ def course(seed: int = 0, samples: int = 400) -> tuple[Cycle, ...]:
     return tuple(cycles(opened, start(opened)))
 
 
+def inverse(skill: object) -> Skill:
+    """A skill that learned the inverse itself, by babbling."""
+    assert isinstance(skill, Skill)
+    return skill
+
+
 @functools.cache
 def skill(seed: int = 0) -> Skill:
     """What the two-joint planar arm has learned."""
-    return toddle.learn("planar:2", **{**SIZES, "seed": seed})
+    options: Any = {**SIZES, "seed": seed}
+    return inverse(toddle.learn("planar:2", **options))
 
 
 @functools.cache
 def plain_skill() -> Skill:
     """The same by the thesis's own network."""
-    return toddle.learn("planar:2", **{**SIZES, "network": "plain"})
+    options: Any = {**SIZES, "network": "plain"}
+    return inverse(toddle.learn("planar:2", **options))
 
 
 @functools.cache

@@ -199,7 +199,7 @@ def test_a_run_in_physics_goes_on_bit_for_bit(reach: Run, tmp_path: Path) -> Non
 
 
 def test_an_answer_is_joints_within_limits_and_the_error_that_they_lead_to(reach: Run, folder: Path) -> None:
-    skill = toddle.load_skill(folder)
+    skill = tiny.inverse(toddle.load_skill(folder))
     for target in skill.seen[:3]:
         code, out, err = reach("--skill", folder, "--target", *target, "--json")
         answer = json.loads(out)
@@ -217,7 +217,7 @@ def test_an_answer_is_joints_within_limits_and_the_error_that_they_lead_to(reach
 
 
 def test_an_answer_in_words(reach: Run, folder: Path) -> None:
-    target = toddle.load_skill(folder).seen[0]
+    target = tiny.inverse(toddle.load_skill(folder)).seen[0]
     code, out, err = reach("--skill", folder, "--target", *target, "--tolerance", 2)
     assert (code, err) == (0, "")
     first, second, verdict = out.splitlines()
@@ -229,7 +229,7 @@ def test_an_answer_in_words(reach: Run, folder: Path) -> None:
 
 
 def test_open_loop_answers_need_no_robot(reach: Run, folder: Path) -> None:
-    target = toddle.load_skill(folder).seen[0]
+    target = tiny.inverse(toddle.load_skill(folder)).seen[0]
     code, out, _ = reach("--skill", folder, "--target", *target, "--looks", 0, "--tolerance", 10, "--json")
     answer = json.loads(out)
     assert (code, answer["looks"]) == (0, 0)
@@ -237,7 +237,7 @@ def test_open_loop_answers_need_no_robot(reach: Run, folder: Path) -> None:
 
 
 def test_an_arm_in_physics_answers_with_what_it_saw(reach: Run, folder: Path) -> None:
-    target = toddle.load_skill(folder).seen[0]
+    target = tiny.inverse(toddle.load_skill(folder)).seen[0]
     physics = ("--plant=physics", "--noise=0mm", "--tolerance", 2, "--json")
     code, out, _ = reach("--skill", folder, "--target", *target, *physics)
     answer = json.loads(out)
@@ -257,11 +257,11 @@ def test_out_of_reach_is_a_wrong_call_and_says_where_to_aim(reach: Run, folder: 
     assert said is not None
     nearest = np.array([float(said[2]), float(said[3])])
     assert 1000 * np.linalg.norm(nearest - [3, 4]) == pytest.approx(float(said[1]), abs=2)
-    assert np.abs(toddle.load_skill(folder).seen - nearest).max(axis=1).min() < 1e-3
+    assert np.abs(tiny.inverse(toddle.load_skill(folder)).seen - nearest).max(axis=1).min() < 1e-3
 
 
 def test_a_sliding_joint_is_not_told_in_degrees(reach: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     slides = replace(planar(2), slides=jnp.array([0.0, 1.0]))
     monkeypatch.setattr(catalogue, "load_choice", lambda choice: slides)
-    out = reach("--skill", folder, "--target", *toddle.load_skill(folder).seen[0])[1]
+    out = reach("--skill", folder, "--target", *tiny.inverse(toddle.load_skill(folder)).seen[0])[1]
     assert [line.endswith("deg)") for line in out.splitlines()] == [True, False, False]

@@ -156,7 +156,8 @@ def test_a_callable_learns_what_the_body_learns() -> None:
 
 def test_a_callable_is_all_that_learn_needs() -> None:
     watched: list[np.ndarray] = []
-    skill = toddle.learn(plant_of(watched=watched), samples=100, per_cycle=100, hidden=(4,), test_points=20)
+    learned = toddle.learn(plant_of(watched=watched), samples=100, per_cycle=100, hidden=(4,), test_points=20)
+    skill = tiny.inverse(learned)
     assert skill.figures["robot"] == "told"
     assert skill.figures["samples"] == 100
     assert len(watched) > 1100, "it surveys with a thousand movements, then learns"
