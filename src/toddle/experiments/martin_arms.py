@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float
 
+from toddle.experiments.experiment import Task
 from toddle.reach.evolve.controller import Scale, Shape
 from toddle.reach.evolve.evolution import Effort, Evolution, Tell, evolve_networks, evolve_weights
 from toddle.reach.evolve.neat import Settings
@@ -24,7 +25,7 @@ METHODS = ("CMA-ES", "NEAT")
 
 @dataclass(frozen=True)
 class Setting:
-    """Of a run. The document gives goals, population and generations; it is silent on the last six.
+    """Of a run. The document gives goals, population and generations; it is silent on the last seven.
 
     Attributes:
         goals: how many are to be reached.
@@ -32,7 +33,9 @@ class Setting:
         neat: parameters of NEAT.
         hidden: neurons of the hidden layer that CMA-ES has.
         sigma: its first step size.
-        inputs: the edges of the goals' box are given to the network as plus or minus this.
+        inputs: the edges of the goals' box are given to CMA-ES's network as plus or minus this; 0: goals are given
+            as they are, in the document's units.
+        neat_inputs: the same for NEAT's; small, because the document's mutation of weights is coarse.
         outputs: joint values are tanh times this times the joint's upper limit (a quarter turn; 20 units of slide).
         goals_from: goals are forward kinematics of joint values uniform between these shares of the upper limit.
         goal_seed: which goals.
@@ -46,6 +49,7 @@ class Setting:
     hidden: int = 7
     sigma: float = 0.25
     inputs: float = 1.0
+    neat_inputs: float = 0.1
     outputs: float = 2.0
     goals_from: tuple[float, float] = (0.2, 0.8)
     goal_seed: int = 0
@@ -58,19 +62,32 @@ def arm_named(name: str) -> Arm:
 
 def goals_of(arm: Arm, setting: Setting, count: int, seed: int) -> Float[np.ndarray, "count space"]:
     """Goals that can be reached [m]."""
-    low, high = setting.goals_from
-    return replace(arm, lower=low * arm.upper, upper=high * arm.upper).drawn(count, seed)
+    return _drawn_from(arm, setting).drawn(count, seed)
 
 
-def shape_of(arm: Arm, setting: Setting) -> Shape:
+def shape_of(arm: Arm, setting: Setting, method: str) -> Shape:
     """The controllers' shape, and the scales of what goes in and out."""
-    low, high = setting.goals_from
-    box = replace(arm, lower=low * arm.upper, upper=high * arm.upper).workspace()
-    return Shape(
-        setting.hidden,
-        box._replace(half=box.half / setting.inputs),
-        Scale(np.zeros_like(arm.upper), setting.outputs * arm.upper),
-    )
+    box, edge = _drawn_from(arm, setting).workspace(), setting.neat_inputs if method == "NEAT" else setting.inputs
+    raw = Scale(np.zeros_like(box.half), np.full_like(box.half, UNIT))
+    inputs = box._replace(half=box.half / edge) if edge else raw
+    return Shape(setting.hidden, inputs, Scale(np.zeros_like(arm.upper), setting.outputs * arm.upper))
+
+
+def _drawn_from(arm: Arm, setting: Setting) -> Arm:
+    """The arm, its joints limited to where goals come from."""
+    low, high = (np.clip(share * arm.upper, arm.lower, arm.upper) for share in setting.goals_from)
+    return replace(arm, lower=low, upper=high)
+
+
+def telling(task: Task, what: str, begins: float, ends: float) -> Tell:
+    """Tell the task what is done of a part of its work, and pass on whether somebody asked to stop."""
+    part = task.part(begins, ends)
+
+    def tell(done: float) -> bool:
+        part.tell(0.99 * done, what)
+        return task.stopped()
+
+    return tell
 
 
 def evolve(name: str, method: str, setting: Setting, seed: int, tell: Tell = lambda done: False) -> Evolution:
@@ -78,18 +95,22 @@ def evolve(name: str, method: str, setting: Setting, seed: int, tell: Tell = lam
     arm = arm_named(name)
     goals = goals_of(arm, setting, setting.goals, setting.goal_seed)
     effort = Effort(setting.runs, setting.population, setting.generations, seed)
+    shape = shape_of(arm, setting, method)
     if method == "NEAT":
-        return evolve_networks(arm, shape_of(arm, setting), goals, effort, settings=setting.neat, tell=tell)
-    return evolve_weights(arm, shape_of(arm, setting), goals, effort, sigma=setting.sigma, tell=tell)
+        return evolve_networks(arm, shape, goals, effort, settings=setting.neat, tell=tell)
+    return evolve_weights(arm, shape, goals, effort, sigma=setting.sigma, tell=tell)
 
 
-def fresh_mse(
-    name: str, found: Evolution, setting: Setting, count: int = 2000, seed: int = 1_000_003
-) -> Float[np.ndarray, " runs"]:
-    """Mean squared distance on goals that evolution never saw, of each run's best controller [units^2]."""
+def fresh_goals(arm: Arm, setting: Setting, count: int = 2000) -> Float[np.ndarray, "count space"]:
+    """Goals that no learner has seen [m]."""
+    return goals_of(arm, setting, count, 1_000_003 + setting.goal_seed)
+
+
+def fresh_mse(name: str, found: Evolution, setting: Setting) -> Float[np.ndarray, " runs"]:
+    """Mean squared distance on fresh goals, of each run's best controller [units^2]."""
     arm = arm_named(name)
-    goals = goals_of(arm, setting, count, seed)
-    return scores(arm, found.answers(goals), goals) / UNIT**2
+    goals = fresh_goals(arm, setting)
+    return in_units(scores(arm, found.answers(goals), goals))
 
 
 def in_units(mse: Float[np.ndarray, "*any"]) -> Float[np.ndarray, "*any"]:
