@@ -53,9 +53,9 @@ def rigid_problem(
 
 
 def _goal(space: int, ops: Ops, target: Tensor, quaternion: Tensor | None = None) -> tuple[Tensor, Tensor]:
-    """The target as the starts' places have it, and (batch, 1, 4, 4): its transform; no turn where none is asked for.
+    """The target as the starts' places have it, and position, rotation row by row and 1 in a column (batch, 1, _, 1).
 
-    The last row says whether one is: a quaternion of zeros asks for none.
+    A quaternion of zeros asks for no orientation: then the rotation and the last row are zeros.
     """
     at = ops.shape(target, (1, space, 1))
     if quaternion is None:
@@ -99,10 +99,10 @@ def _miss(model: Rigid, scale: np.ndarray, turned: bool, ops: Ops, q: Tensor, go
     asked = ops.take(goal, [space + 9], -2)
     towards, angle = _turn_left(ops, ops.take(goal, range(space, space + 9), -2), tip.pose)
     return Miss(
-        ops.join([error, asked * LEVER * towards], -2),
+        ops.join([error, LEVER * towards], -2),
         ops.join([slope, asked * LEVER * ops.matmul(tip.turn, gain)], -2),
         square,
-        _flat(ops, asked * angle),
+        _flat(ops, angle),
     )
 
 
