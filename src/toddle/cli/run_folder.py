@@ -26,7 +26,7 @@ FILES = (
 )  # fmt: skip
 
 
-_TOLD_ELSEWHERE = ("changes", "movements", "why")
+_TOLD_ELSEWHERE = ("changes", "damage_said", "movements", "why")
 
 
 def refuse_used(out: Path | None) -> None:

@@ -18,6 +18,7 @@ from toddle.reach.model.model import Fit
 from toddle.robots.body import Body, Plant
 from toddle.robots.chain import Chain
 from toddle.robots.continuum import Continuum
+from toddle.robots.soft_variants import SoftVariant
 from toddle.signals import Experience
 
 _MOST_PRODUCTS = 5  # joints whose products of 1, cos and sin are few enough
@@ -124,7 +125,7 @@ def suited(body: Body | Plant | None) -> tuple[tuple[str, ...], str]:
     if isinstance(body, Chain):
         count = len(body.joints)
         return ("screws",), f"a rigid arm ({count} joint{'s' * (count > 1)}), so its axes are looked for"
-    if isinstance(body, Continuum):
+    if isinstance(body, Continuum | SoftVariant):
         return ("curvature",), f"a soft arm ({len(body.joints)} actuators), so its bending segments are looked for"
     joints = len(body.joints) if body is not None else 0
     few = ("multilinear",) if 0 < joints <= _MOST_PRODUCTS else ()

@@ -10,6 +10,9 @@ from jaxtyping import Float
 
 from toddle.reach.body_skill import BodySkill
 from toddle.reach.gather import together
+from toddle.reach.model.crippled import Crippled
+from toddle.reach.model.curvature import Curvature
+from toddle.reach.model.curvature_update import updated
 from toddle.reach.model.damage_watch import Alarm, Level, Watch, look
 from toddle.reach.model.model import Model
 from toddle.reach.model.soft_damage import diagnose, probe_movements
@@ -17,6 +20,7 @@ from toddle.reach.solve.solver import ModelSolver, Solver
 from toddle.signals import Experience
 
 _LEAST_NOISE = 1e-5  # [m]
+_STARTS = 300  # postures
 _IN_WORDS = {"locked": "is locked", "weak": "moves less than it is told", "slip": "has slipped"}
 
 
@@ -52,6 +56,8 @@ class SoftAdaptation:
             return alarm, "" if self._probes else self._understand(self._since)
         if alarm.level is Level.CALM:
             self._since = None
+            if isinstance(self.model, Crippled) and isinstance(self.model.model, Curvature):
+                self._take(updated(self.model, one, self._sensor))
             return alarm, ""
         self._since = one if self._since is None else together(self._since, one)
         if alarm.level is Level.SUSPECTED:
@@ -62,13 +68,16 @@ class SoftAdaptation:
         self._probes = list(probe_movements(q, self._skill.lower, self._skill.upper))
         return alarm, "the body changed: each actuator is moved by itself, to see which ones follow"
 
+    def _take(self, model: Model) -> None:
+        """From now on the body is like that; it starts from postures that it knows."""
+        known = self._skill.experience.q[:_STARTS]
+        memory = Experience(known, model.forward(known))
+        self.model, self.solver = model, ModelSolver(model, self._skill.lower, self._skill.upper, memory)
+
     def _understand(self, since: Experience) -> str:
-        """What the probes show; from now on the body is taken to be like that."""
+        """What the probes show."""
         found = diagnose(self._skill.fit.model, since, self._skill.lower, self._skill.upper, self._sensor)
-        self.model = found.model
-        known = self._skill.experience.q
-        memory = Experience(known, found.model.forward(known))
-        self.solver = ModelSolver(found.model, self._skill.lower, self._skill.upper, memory)
+        self._take(found.model)
         self._watch, self._since = Watch.start(self._wild), None
         if not found.causes:
             return "every actuator follows: the body is taken as it was"
