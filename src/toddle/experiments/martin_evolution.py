@@ -44,6 +44,8 @@ QUICK = replace(FULL, setting=Setting(runs=10), best_runs=5)
 TABLE_4 = {"planar": (-0.9162, 0.1835), "SCARA": (3.2418, 0.0015)}
 TABLE_5 = {"planar": (-44.5719, 9.7944e-20), "SCARA": (-20.6801, 3.3533e-9)}
 """t and its significance, CMA-ES against NEAT; all runs (table 4), the best ten (table 5)."""
+CROSSING = {"SCARA": 132}
+"""Generation at which the best run of CMA-ES comes below that of NEAT (figure 6, as the text reads it)."""
 
 
 class Welch(NamedTuple):
@@ -77,6 +79,10 @@ def run(task: Task) -> Outcome:
     rows = [row for cell, one in found.items() for row in rows_of(cell, np.sort(in_units(one.mse)))]
     tests = {name: tests_of(name, found, parameters.best_runs) for name in ARMS}
     rows += [row for name in ARMS for row in rows_of_tests(name, tests[name])]
+    rows += [
+        Row(f"{name} arm: the best runs' curves cross at generation", crossing(name, found), CROSSING.get(name))
+        for name in ARMS
+    ]
     spent = sum(value for cell, value in seconds.items() if "CMA-ES" in cell)
     rows.append(Row("processor time of CMA-ES, both arms, all runs", spent, None, "s"))
     draw(found, task.folder)
@@ -139,6 +145,15 @@ def rows_of_tests(name: str, tests: Mapping[str, Welch]) -> list[Row]:
             Row(f"{name} arm, {which} runs: significance", tests[which].p, printed[1]),
         )
     ]
+
+
+def crossing(name: str, found: Runs) -> float | None:
+    """The generation from which on the best run of CMA-ES lies below that of NEAT; None: it never does."""
+    ours, theirs = (one.course[:, one.mse.argmin()] for one in (found[name, method] for method in METHODS))
+    count = min(len(ours), len(theirs))
+    above = np.flatnonzero(ours[:count] >= theirs[:count])
+    last = int(above[-1]) + 1 if len(above) else 0
+    return float(last + 1) if last < count else None
 
 
 def draw(found: Runs, folder: Path) -> None:

@@ -16,7 +16,7 @@ from jaxtyping import Float
 from toddle.reach.evolve.controller import Shape, inputs_of, respond_with_slopes
 from toddle.reach.model.model import Model
 
-_FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-2, 1e-12, 1e12
+_FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-1, 1e-10, 1e10
 
 
 class Refined(NamedTuple):
@@ -49,12 +49,13 @@ def refine(
     """
     inputs = inputs_of(shape, goals)
     mse, normal, slope = _linearised(shape, model, goals, inputs, weights)
+    # not each weight by its own diagonal: that lets the weights of saturated neurons run away
+    scale = np.einsum("sww->s", normal) / shape.weights + 1e-12
     damping, growth = np.full(len(weights), _FIRST_DAMPING), np.full(len(weights), 2.0)
     for _ in range(iterations):
-        diagonal = np.einsum("sww->sw", normal) + 1e-9 * np.einsum("sww->s", normal)[:, None]
-        damped = normal + (damping[:, None] * diagonal)[:, :, None] * np.eye(shape.weights)
+        damped = normal + (damping * scale)[:, None, None] * np.eye(shape.weights)
         step = -np.linalg.solve(damped, slope[:, :, None])[:, :, 0]
-        promised = np.einsum("sw,sw->s", step, damping[:, None] * diagonal * step - slope)
+        promised = np.einsum("sw,sw->s", step, (damping * scale)[:, None] * step - slope)
         tried = _linearised(shape, model, goals, inputs, weights + step)
         gain = (mse - tried[0]) / np.maximum(promised, 1e-300)
         helped = tried[0] < mse

@@ -182,9 +182,9 @@ def _grown(
     """New nodes and connections, in the few children that get any; they are changed in place."""
     nodes = nodes._replace(depth=nodes.depth.copy(), split=nodes.split.copy())
     for run, child in np.argwhere((random.random(copied.shape) < settings.add_node) & ~copied):
-        _add_node(genomes, nodes, run, child, random)
+        _add_node(genomes, nodes, int(run), int(child), random)
     for run, child in np.argwhere((random.random(copied.shape) < settings.add_connection) & ~copied):
-        _add_connection(genomes, nodes, run, child, random)
+        _add_connection(genomes, nodes, int(run), int(child), random)
     return genomes, nodes
 
 
