@@ -25,6 +25,8 @@ from toddle.signals import Experience
 
 _FOLDS = 5
 _ENOUGH = 100  # movements from which an arm is learned from nothing rather than by a doubtful correction
+_STILL = 1e-6  # [m]
+_WIDEST = 40.0  # [rad, m]: what goes further is told in degrees or millimetres
 _BEYOND = 0.05  # of a joint's range: how far a recorded value may lie outside its limits
 
 
@@ -173,11 +175,17 @@ def held_out_errors(
 
 def _known(experience: Experience, joints: tuple[str, ...], described: Chain | None, where: str) -> Known:
     """Names and ranges: the description's, or those that were visited."""
+    if np.ptp(experience.x, axis=0).max() < _STILL:
+        raise BadInput("the tip never moves", where=where, remedy="record where it is seen, or watch another tip")
     if described is None:
         lower, upper = experience.q.min(axis=0), experience.q.max(axis=0)
         still = [name for name, low, high in zip(joints, lower, upper, strict=True) if not high > low]
         if still:
             raise BadInput(f"{still[0]} never moves", where=where, remedy="record movements in which it does")
+        wide = int(np.argmax(upper - lower))
+        if upper[wide] - lower[wide] > _WIDEST:
+            ways = joints[wide], lower[wide], upper[wide]
+            raise BadInput("{} goes from {:.3g} to {:.3g}".format(*ways), where=where, remedy="give radians and metres")
         return Known(joints, lower, upper, np.median(experience.q, axis=0))
     lower, upper, home = (np.asarray(v, float) for v in (described.lower, described.upper, described.home))
     if experience.x.shape[1] != len(described.coordinates):
