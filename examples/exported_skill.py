@@ -15,6 +15,7 @@ def learn_and_export(folder: Path) -> None:
     from toddle.outside.export import export
 
     skill = toddle.learn("nicu", noise=0.001, samples=150, test_points=200)
+    assert isinstance(skill, toddle.BodySkill)  # it learned its body, not the inverse
     export(skill, folder / "skill.onnx")
     export(skill, folder / "skill.jax")
 
@@ -24,10 +25,10 @@ def by_onnx(file: Path, targets: np.ndarray) -> np.ndarray:
 
     session = onnxruntime.InferenceSession(file, providers=["CPUExecutionProvider"])
     facts = session.get_modelmeta().custom_metadata_map
-    joints, distance = session.run(["joints", "distance"], {"target": targets})
+    joints, distance = map(np.asarray, session.run(["joints", "distance"], {"target": targets}))
     print(f"{facts['joints']}: expected error {1000 * float(facts['expected_error_m']):.2f} mm")
     print(f"reached: {distance < 1e-4}")
-    return np.asarray(joints)
+    return joints
 
 
 def by_jax(file: Path, targets: np.ndarray) -> np.ndarray:
