@@ -55,6 +55,7 @@ def model_problem(
         lower, upper, upper - lower, _STRIDE, starts, model.forward(starts),
         rows=model.space,
         lever=0.0,
+        freest=True,
         goal=lambda ops, target: (target, ops.shape(target, (1, model.space))),
         miss=partial(_miss, forward, upper - lower, model.space),
     )  # fmt: skip

@@ -47,6 +47,7 @@ def rigid_problem(
         lower, upper, scale, _STRIDE, starts, places,
         rows=len(model.coordinates) + (3 if turned else 0),
         lever=LEVER,
+        freest=False,
         goal=partial(_goal, len(model.coordinates)),
         miss=partial(_miss, model, scale, turned),
     )  # fmt: skip

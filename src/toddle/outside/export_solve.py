@@ -54,6 +54,7 @@ class Problem:
         places: where they put the tip, and how it is turned [m].
         rows: of the task: position, and orientation where it is known.
         lever: what an angle counts for [m/rad].
+        freest: whether the freest of all postures that arrive is taken, else the first one to arrive.
         goal: operations and the inputs to the target as ``places`` has it, and what ``miss`` is to know of it.
         miss: operations, postures and goal to what is missing there.
     """
@@ -66,6 +67,7 @@ class Problem:
     places: Float[np.ndarray, "starts places"]
     rows: int
     lever: float
+    freest: bool
     goal: Callable[..., tuple[Tensor, Tensor]]
     miss: Callable[[Ops, Tensor, Tensor], Miss]
 
@@ -90,6 +92,8 @@ def answered(ops: Ops, problem: Problem, *inputs: Tensor) -> dict[str, Tensor]:
     q, total = ops.repeat(rounds, descent, (first, none))
     q, total = _descended(ops, problem, goal, q, total, SETTLE, careful=True)
     level = ops.maximum(total, ops.constant(_REACHED**2))  # all that arrived are as good: the nearest start's is taken
+    if problem.freest:
+        level = ops.where(total > _REACHED**2, total, -_freedom(ops, problem, problem.miss(ops, q, goal).slope, q))
     chosen = ops.sum(q * ops.first_least(level, lanes, 1), 1)
     end = problem.miss(ops, chosen, goal)
     outputs = {"joints": ops.shape(chosen, (joints,)), "distance": ops.shape(ops.sqrt(end.square), ())}
@@ -125,11 +129,35 @@ def _descended(
         onward = _moved(ops, problem, miss, growth * (_DAMPING * total + _LEAST), q)
         if careful:
             onward = ops.where(better, onward, kept)
-        left = _unsolved(ops, ops.minimum(least, other))
+        if problem.freest:
+            left = _unsolved(ops, other) & (least > _REACHED**2)
+        else:
+            left = _unsolved(ops, ops.minimum(least, other))
         return (ops.where(left, onward, q), kept, least, growth), left
 
     none = 0.0 * ops.sum(q, -1)
     return ops.repeat(steps, step, (q, q, none + _FAR, none + 1.0))[1:3]
+
+
+def _freedom(ops: Ops, problem: Problem, slope: Tensor, q: Tensor) -> Tensor:
+    """How far postures are from being stuck (batch, lanes, 1); see `toddle.reach.solve.gauss_newton.freedom`.
+
+    Its smallest singular value stands here as the root of 1 / trace (J J')^-1, which is at most that.
+    """
+    lanes = min(LANES, len(problem.starts))
+    unit = ops.constant(np.eye(problem.rows)[None, None])
+    inverse = _solved(
+        ops,
+        ops.matmul(slope, ops.turned(slope)),
+        unit + 0.0 * ops.take(slope, [0], -1),
+        ops.constant(_LEAST),
+        problem.rows,
+        problem.rows,
+    )
+    trace = ops.shape(ops.sum(ops.sum(unit * inverse, -1), -2), (lanes, 1))
+    lower, upper = (ops.constant(part[None, None]) for part in (problem.lower, problem.upper))
+    margin = ops.least(ops.minimum(q - lower, upper - q) / (upper - lower), -1)
+    return ops.minimum(ops.maximum(margin * 10.0, ops.constant(0.02)), ops.constant(1.0)) / ops.sqrt(trace)
 
 
 def _moved(ops: Ops, problem: Problem, miss: Miss, damping: Tensor, q: Tensor) -> Tensor:
@@ -159,7 +187,7 @@ def _step(ops: Ops, problem: Problem, error: Tensor, slope: Tensor, damping: Ten
     return ops.shape(ops.matmul(across, pull), (-1, len(problem.scale)))
 
 
-def _solved(ops: Ops, matrix: Tensor, right: Tensor, damping: Tensor, rows: int) -> Tensor:
+def _solved(ops: Ops, matrix: Tensor, right: Tensor, damping: Tensor, rows: int, sides: int = 1) -> Tensor:
     """(A + lambda I)^-1 b for a positive A, by Gauss and Jordan: it needs no pivoting then, and no linear algebra."""
     unit = np.eye(rows)
     table = ops.join([matrix + damping * ops.constant(unit[None, None]), right], -1)
@@ -167,4 +195,4 @@ def _solved(ops: Ops, matrix: Tensor, right: Tensor, damping: Tensor, rows: int)
         row = ops.take(table, [k], -2)
         row = row / ops.maximum(ops.take(row, [k], -1), damping)
         table = table - (ops.take(table, [k], -1) - ops.constant(unit[None, None, :, k : k + 1])) * row
-    return ops.take(table, [rows], -1)
+    return ops.take(table, range(rows, rows + sides), -1)
