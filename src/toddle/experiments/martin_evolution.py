@@ -44,7 +44,7 @@ QUICK = replace(FULL, setting=Setting(runs=10), best_runs=5)
 TABLE_4 = {"planar": (-0.9162, 0.1835), "SCARA": (3.2418, 0.0015)}
 TABLE_5 = {"planar": (-44.5719, 9.7944e-20), "SCARA": (-20.6801, 3.3533e-9)}
 """t and its significance, CMA-ES against NEAT; all runs (table 4), the best ten (table 5)."""
-CROSSING = {"SCARA": 132}
+CROSSING = {"SCARA": 132.0}
 """Generation at which the best run of CMA-ES comes below that of NEAT (figure 6, as the text reads it)."""
 
 

@@ -60,6 +60,7 @@ def variants(setting: Setting) -> dict[str, dict[str, Setting]]:
             "outputs to ±3 upper limits": replace(setting, outputs=3.0),
             **goals,
             "joints 0 to 90 deg, inputs to ±3": replace(setting, goals_from=QUARTER, inputs=3.0),
+            "joints 0 to 90 deg, raw inputs, first step 1": replace(setting, goals_from=QUARTER, inputs=0.0, sigma=1.0),
             "joints and outputs -90 to 90 deg": replace(setting, goals_from=LIMITS, outputs=1.0),
         },
         "NEAT": {
