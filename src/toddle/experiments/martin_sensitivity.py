@@ -39,8 +39,8 @@ def variants(setting: Setting) -> dict[str, dict[str, Setting]]:
     """What is changed, method by method."""
     with_neat = lambda **changed: replace(setting, neat=replace(setting.neat, **changed))  # noqa: E731
     goals = {
-        "joints 0 to 90 deg, slide 0 to 20": replace(setting, goals_from=QUARTER),
-        "joints -90 to 90 deg, slide 0 to 20": replace(setting, goals_from=LIMITS),
+        "goals: joints 0 to 90 deg, slide 0 to 20": replace(setting, goals_from=QUARTER),
+        "goals: joints -90 to 90 deg, slide 0 to 20": replace(setting, goals_from=LIMITS),
         "other 70 goals": replace(setting, goal_seed=1),
     }
     return {
@@ -59,9 +59,7 @@ def variants(setting: Setting) -> dict[str, dict[str, Setting]]:
             "outputs to ±1.5 upper limits": replace(setting, outputs=1.5),
             "outputs to ±3 upper limits": replace(setting, outputs=3.0),
             **goals,
-            "joints 0 to 90 deg, inputs to ±3": replace(setting, goals_from=QUARTER, inputs=3.0),
-            "joints 0 to 90 deg, raw inputs, first step 1": replace(setting, goals_from=QUARTER, inputs=0.0, sigma=1.0),
-            "joints and outputs -90 to 90 deg": replace(setting, goals_from=LIMITS, outputs=1.0),
+            "goals and outputs within ±90 deg": replace(setting, goals_from=LIMITS, outputs=1.0),
         },
         "NEAT": {
             "as taken": setting,
