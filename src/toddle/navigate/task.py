@@ -67,18 +67,17 @@ S = TypeVar("S")
 
 @runtime_checkable
 class Task(Protocol[S]):
-    """Something to learn. Runs under ``jit``, ``vmap`` and ``scan``.
-
-    Attributes:
-        observations: how many numbers an observation has.
-        actions: what may be done.
-    """
+    """Something to learn. Runs under ``jit``, ``vmap`` and ``scan``."""
 
     @property
-    def observations(self) -> int: ...
+    def observations(self) -> int:
+        """How many numbers an observation has."""
+        ...
 
     @property
-    def actions(self) -> Actions: ...
+    def actions(self) -> Actions:
+        """What may be done."""
+        ...
 
     def start(self, key: PRNGKeyArray) -> tuple[S, Float[Array, " numbers"]]:
         """A new episode: its state and first observation."""
