@@ -1,4 +1,4 @@
-"""Trying a policy out on a task, in JAX: without noise, for so many steps or until every actor's first episode ended."""
+"""Trying a policy out on a task, in JAX and without noise: for so many steps, or one episode of each actor."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from toddle.navigate.policy import Policy
-from toddle.navigate.task import Outcome, Task
+from toddle.navigate.ppo.config import PpoConfig
+from toddle.navigate.ppo.moments import Moments
+from toddle.navigate.ppo.network import ActorCritic
+from toddle.navigate.task import Actions, Outcome, Task
 
 
 class Tally(NamedTuple):
@@ -59,17 +62,23 @@ def episodes(task: Task[Any], policy: Policy, key: PRNGKeyArray, actors: int, st
     )
 
 
-def _arrays(policy: Policy) -> tuple:
+def _arrays(policy: Policy) -> tuple[ActorCritic, Moments]:
     return policy.network, policy.moments
 
 
 @partial(jax.jit, static_argnums=(0, 1, 4, 5))
 def _tried(
-    task: Task[Any], known: tuple, learned: tuple, key: PRNGKeyArray, actors: int, steps: int
+    task: Task[Any],
+    known: tuple[PpoConfig, Actions],
+    learned: tuple[ActorCritic, Moments],
+    key: PRNGKeyArray,
+    actors: int,
+    steps: int,
 ) -> tuple[Int[Array, "steps actors"], Float[Array, "steps actors"], Bool[Array, "steps actors"]]:
     """Outcome, reward and whether an episode ended, of each step."""
     config, actions = known
-    policy = Policy(*learned, config, task.observations, actions)
+    network, moments = learned
+    policy = Policy(network, moments, config, task.observations, actions)
 
     def one(carry: tuple, key: PRNGKeyArray) -> tuple:
         state, observation, memory = carry

@@ -177,7 +177,7 @@ def walk(
     robot: Robot,
     commands: CommandSource,
     seconds: float | None = None,
-    circles: tuple[Circle, ...] = (),
+    circles: tuple[Circle, ...] | Callable[[float], tuple[Circle, ...]] = (),
     *,
     limited: bool = True,
 ) -> Iterator[Moment]:
@@ -190,7 +190,7 @@ def walk(
         robot: moves and feels.
         commands: asked at each tick.
         seconds: the most to walk [s]; None: as long as commands come.
-        circles: obstacles, in the frame of ``Senses.place``.
+        circles: obstacles, in the frame of ``Senses.place``; those that move: a function of time [s].
         limited: whether the gate limits how fast a command changes.
     """
     senses, state, allowed = robot.reset(), walker.start(), STILL
@@ -207,7 +207,8 @@ def walk(
             return
         command = STILL if asked is None else asked
         allowed = gate(allowed, command, walker.gait.fastest, TICK, limited=limited)
-        state, action = walker.step(state, allowed, senses, circles)
+        around = circles(state.t) if callable(circles) else circles
+        state, action = walker.step(state, allowed, senses, around)
         senses = robot.tick(action.servo)
         fell = bool(np.abs(action.estimate.tilt).max() > _FALLEN)
         measured = _measured(walker, state)

@@ -175,6 +175,25 @@ class HumanoidSimulation:
             raise BadInput(f"{push} is no push", where="push", remedy="give finite numbers, and a duration above 0")
         self._pushes.append((push, None))
 
+    def move(self, obstacle: int, x: float, y: float) -> None:
+        """Put an obstacle somewhere else [m], until the next `reset`: so people walk.
+
+        Args:
+            obstacle: its place in the world's ``circles``.
+            x: of its centre.
+            y: likewise.
+
+        Raises:
+            BadInput: there is no such obstacle, or a number is not finite.
+        """
+        if not (0 <= obstacle < len(self.options.circles) and math.isfinite(x) and math.isfinite(y)):
+            raise BadInput(
+                f"obstacle {obstacle} of {len(self.options.circles)} can't move to ({x:g}, {y:g})",
+                where="move",
+                remedy="count from 0, and give finite numbers",
+            )
+        self.data.mocap_pos[obstacle, :2] = x, y
+
     def truth(self) -> Truth:
         """What is so at this moment; contact forces and servos' torques are those of the last physics step."""
         model, data = self.model, self.data

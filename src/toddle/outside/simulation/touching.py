@@ -39,7 +39,8 @@ def shapes(model: mujoco.MjModel, obstacles: int) -> Shapes:
     legs = {body for foot in feet for body in _upwards(model, foot)} - feet - trunk
     part = np.full(model.ngeom, _NONE)
     solid = (model.geom_contype | model.geom_conaffinity) != 0
-    for geom in np.flatnonzero(solid & (rigid[model.geom_bodyid] != 0)).tolist():
+    theirs = (rigid[model.geom_bodyid] != 0) & (model.body_mocapid[model.geom_bodyid] < 0)
+    for geom in np.flatnonzero(solid & theirs).tolist():
         body = int(rigid[model.geom_bodyid[geom]])
         part[geom] = FEET if body in feet else LEGS if body in legs else BODY
     obstacle = np.zeros(model.ngeom, bool)

@@ -115,7 +115,8 @@ def _bumps(spec: Any, options: WorldOptions, draw: np.random.Generator) -> None:
 
 def _obstacles(spec: Any, options: WorldOptions) -> None:
     for number, circle in enumerate(options.circles):
-        body = spec.worldbody.add_body(name=OBSTACLE.format(number), pos=[circle.x, circle.y, _TALL / 2])
+        name, place = OBSTACLE.format(number), [circle.x, circle.y, _TALL / 2]
+        body = spec.worldbody.add_body(name=name, pos=place, mocap=True)  # mocap: nothing but `move` moves it
         _ = body.add_geom(
             name=OBSTACLE.format(number),
             type=mujoco.mjtGeom.mjGEOM_CYLINDER,
