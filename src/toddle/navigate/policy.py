@@ -1,6 +1,7 @@
 """What learning leaves: a policy, from an observation to the action that it thinks best.
 
-It is a value: saved, loaded, compared, exported. The observation's normaliser is a part of it. It draws nothing: of a distribution it takes the likeliest action.
+It is a value: saved, loaded, compared, exported. The observation's normaliser is a part of it. It draws nothing: of a
+distribution it takes the likeliest action.
 """
 
 from __future__ import annotations
