@@ -146,7 +146,7 @@ class WalkerTask:
         """
         walker = self.walks.start()
         place, goal = self.walks.place(walker), jnp.asarray(where.goal)
-        people = enter(key, _room(goal), self.people, self.body + RADIUS + ROOM)
+        people = enter(key, room(goal), self.people, self.body + RADIUS + ROOM)
         seen = self._scan(place, jnp.asarray(where.circles), people)
         course = Course(walker, place, goal, jnp.asarray(where.circles), people, seen, jnp.int32(0))
         return course, self._observation(course, jnp.zeros_like(seen))
@@ -159,7 +159,7 @@ class WalkerTask:
             action: -1 to 1; what lies beyond counts as the nearest of these.
             key: for people.
         """
-        people = walk(state.people, key, _room(state.goal), self.dt)
+        people = walk(state.people, key, room(state.goal), self.dt)
         told = jnp.concatenate([state.circles, people.circles]) if self.told else jnp.zeros((0, 3))
         walker = self._advanced(state.walker, self.velocity(action), told)
         place = self.walks.place(walker)
@@ -210,13 +210,32 @@ class WalkerTask:
         return scan(place, jnp.concatenate([circles, people.circles]), self.scan_rays, self.reach)
 
     def _observation(self, course: Course, change: Float[Array, " rays"]) -> Float[Array, " numbers"]:
-        goal = bearing(course.place, course.goal).goal
+        velocity = self.walks.velocity(course.walker)
+        return self.observation(course.place, course.goal, velocity, course.seen, change)
+
+    def observation(
+        self,
+        place: Float[Array, "3"],
+        goal: Float[Array, "2"],
+        velocity: Float[Array, "3"],
+        seen: Float[Array, " rays"],
+        change: Float[Array, " rays"],
+    ) -> Float[Array, " numbers"]:
+        """What a policy is shown, here and on a robot.
+
+        Args:
+            place: x, y [m] and yaw [rad] of the robot.
+            goal: x, y [m].
+            velocity: let through last: vx, vy [m/s], omega [rad/s].
+            seen: `scan` of `scan_rays` rays.
+            change: of it since the last action [1/s]; 0 at first.
+        """
+        ahead = bearing(place, goal).goal
         if self.observe == "document":
-            return goal
-        velocity = self.walks.velocity(course.walker) / jnp.array(self.walks.fastest)
-        parts = [goal, velocity, course.seen, *([change] if self.people else [])]
-        seen = jnp.concatenate(parts)
-        return jnp.where(jnp.isfinite(seen), seen, 0.0)
+            return ahead
+        shares = velocity / jnp.array(self.walks.fastest)
+        row = jnp.concatenate([ahead, shares, seen, *([change] if self.people else [])])
+        return jnp.where(jnp.isfinite(row), row, 0.0)
 
 
 def bearing(place: Float[Array, "3"], goal: Float[Array, "2"]) -> Bearing:
@@ -233,8 +252,8 @@ def bearing(place: Float[Array, "3"], goal: Float[Array, "2"]) -> Bearing:
     return Bearing(seen, distance, seen[0] / jnp.maximum(distance, 1e-6))
 
 
-def _room(goal: Float[Array, "2"]) -> Room:
-    """Where people walk: a square around start and goal."""
+def room(goal: Float[Array, "2"]) -> Room:
+    """Where people walk: a square around start and goal [m]."""
     return Room(goal / 2, jnp.hypot(goal[0], goal[1]) / 2 + _AROUND)
 
 
