@@ -20,8 +20,8 @@ RADII = (0.1, 0.3)
 ROOM = 0.2
 """Between the robot's edge at the start and any circle, at least [m]; at the goal half of it."""
 
-_BETWEEN = 0.7  # share of circles that are drawn between start and goal
-_ASIDE = 0.5  # those lie so far to both sides of the straight way [m]
+_BETWEEN = 0.8  # share of circles that are drawn between start and goal
+_ASIDE = 0.4  # those lie so far to both sides of the straight way [m]
 _AROUND = 1.0  # the others: in a square that reaches so far beyond start and goal [m]
 _TRIES = 8  # circles drawn for each one; the first that leaves room is taken, or none
 
@@ -34,8 +34,8 @@ class Layout(NamedTuple):
         circles: x, y, radius of each obstacle [m]; a negative radius for none.
     """
 
-    goal: Float[Array, "*layouts 2"]
-    circles: Float[Array, "*layouts circles 3"]
+    goal: Float[Array | np.ndarray, "*layouts 2"]
+    circles: Float[Array | np.ndarray, "*layouts circles 3"]
 
 
 def layout(key: PRNGKeyArray, goal: tuple[float, float], circles: int, body: float) -> Layout:
