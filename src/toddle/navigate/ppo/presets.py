@@ -1,0 +1,44 @@
+"""Numbers that are known to work, by the name of what is learned with them."""
+
+from __future__ import annotations
+
+from toddle.navigate.ppo.config import PpoConfig
+
+POINT = PpoConfig(
+    steps=500_000,
+    actors=16,
+    horizon=256,
+    minibatch=512,
+    epochs=8,
+    epsilon=0.2,
+    c1=0.5,
+    c2=0.1,
+    c2_over_reward=True,
+    learning_rate=3e-3,
+    hidden=(16, 32),
+    activation="relu",
+    bound="mean",
+    normalise_observations=False,
+    normalise_rewards=False,
+)
+"""The document's point (Huber 2019, section 4.3.1)."""
+
+PRESETS = {
+    "point": POINT,
+    "Pendulum-v1": PpoConfig(
+        steps=100_000, actors=16, horizon=128, minibatch=256, epochs=10, gamma=0.9, learning_rate=1e-3
+    ),
+    "CartPole-v1": PpoConfig(
+        steps=60_000, actors=16, horizon=64, minibatch=256, epochs=8, gamma=0.99, learning_rate=1e-3
+    ),
+}
+"""By the name of what is learned."""
+
+
+def preset(name: str) -> PpoConfig:
+    """The numbers for something to learn; for what nobody has tuned any, the usual ones.
+
+    Args:
+        name: of a task, or the id of a Gymnasium environment.
+    """
+    return PRESETS.get(name, PpoConfig())
