@@ -25,6 +25,7 @@ _LOOPS = """\
 COMMANDS = {
     "reach": "an arm learns to reach, and is asked to",
     "walk": "a humanoid walks, by itself or under your keys",
+    "navigate": "the humanoid learns to find its way",
     "experiment": "a document's table or figure, ours beside theirs",
     "doctor": "what this machine has, and lacks",
 }
@@ -34,6 +35,7 @@ _EXAMPLES = """\
   toddle reach my/arm.urdf --tip hand              your own robot
   toddle walk                                      a humanoid walks, in physics
   toddle walk --keys                               drive it from the terminal
+  toddle navigate ppo                              it learns to walk to goals
   toddle doctor                                    is everything here?"""
 
 

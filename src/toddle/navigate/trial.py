@@ -44,14 +44,23 @@ class Episode(NamedTuple):
 
 def tally(task: Task[Any], policy: Policy, key: PRNGKeyArray, actors: int, steps: int) -> Tally:
     """So many steps of each actor, episode after episode (the deterministic test of Huber 2019, section 4.3.1)."""
-    outcome, reward, _ = _tried(task, (policy.config, policy.actions), _arrays(policy), key, actors, steps)
+    begun, key = _begun(task, key, actors)
+    outcome, reward, _ = _tried(task, (policy.config, policy.actions), _arrays(policy), begun, key, steps)
     counts = jnp.stack([(outcome == kind).sum(axis=0) for kind in Outcome], axis=1)
     return Tally(counts, reward.sum(axis=0))
 
 
 def episodes(task: Task[Any], policy: Policy, key: PRNGKeyArray, actors: int, steps: int) -> Episode:
     """The first episode of each actor, of at most so many steps."""
-    outcome, reward, ended = _tried(task, (policy.config, policy.actions), _arrays(policy), key, actors, steps)
+    begun, key = _begun(task, key, actors)
+    return episodes_from(task, policy, begun, key, steps)
+
+
+def episodes_from(
+    task: Task[Any], policy: Policy, begun: tuple[Any, Float[Array, "actors numbers"]], key: PRNGKeyArray, steps: int
+) -> Episode:
+    """The same from given starts: what ``task.start`` would have returned, with a leading axis of actors."""
+    outcome, reward, ended = _tried(task, (policy.config, policy.actions), _arrays(policy), begun, key, steps)
     first = jnp.argmax(ended, axis=0)
     done = ended.any(axis=0)
     length = jnp.where(done, first + 1, steps).astype(jnp.int32)
@@ -62,17 +71,22 @@ def episodes(task: Task[Any], policy: Policy, key: PRNGKeyArray, actors: int, st
     )
 
 
+def _begun(task: Task[Any], key: PRNGKeyArray, actors: int) -> tuple[Any, PRNGKeyArray]:
+    beginning, key = jax.random.split(key)
+    return jax.vmap(task.start)(jax.random.split(beginning, actors)), key
+
+
 def _arrays(policy: Policy) -> tuple[ActorCritic, Moments]:
     return policy.network, policy.moments
 
 
-@partial(jax.jit, static_argnums=(0, 1, 4, 5))
+@partial(jax.jit, static_argnums=(0, 1, 5))
 def _tried(
     task: Task[Any],
     known: tuple[PpoConfig, Actions],
     learned: tuple[ActorCritic, Moments],
+    begun: tuple[Any, Float[Array, "actors numbers"]],
     key: PRNGKeyArray,
-    actors: int,
     steps: int,
 ) -> tuple[Int[Array, "steps actors"], Float[Array, "steps actors"], Bool[Array, "steps actors"]]:
     """Outcome, reward and whether an episode ended, of each step."""
@@ -91,10 +105,11 @@ def _tried(
         here = (state, step.observation, memory)
         return jax.tree.map(lambda a, b: jnp.where(ended, a, b), following, here), (step.outcome, step.reward, ended)
 
+    state, observation = begun
+    actors = len(observation)
+
     def each(carry: tuple, key: PRNGKeyArray) -> tuple:
         return jax.vmap(one)(carry, jax.random.split(key, actors))
 
-    beginning, key = jax.random.split(key)
-    state, observation = jax.vmap(task.start)(jax.random.split(beginning, actors))
     memory = jnp.broadcast_to(policy.start(), (actors, *policy.start().shape))
     return jax.lax.scan(each, (state, observation, memory), jax.random.split(key, steps))[1]

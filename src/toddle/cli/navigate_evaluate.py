@@ -1,0 +1,237 @@
+"""``toddle navigate evaluate``: who steers is judged, on the walking robot in physics, on its pattern, or on a task."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from toddle.cli.arguments import parse
+from toddle.failures import BadInput
+
+if TYPE_CHECKING:
+    from toddle.outside.navigation.course import Course, Finish
+
+_PROG = "toddle navigate evaluate"
+_MOST = {"episodes": 100_000, "jobs": 1024, "circles": 20, "people": 10}
+
+
+@dataclass(frozen=True)
+class Evaluate:
+    """Who steers the robot is judged: a learned policy, the scripted drivers that it is set beside, or a script.
+
+    A policy that walks is judged in physics, whatever it was trained on; --pattern judges it on the walking pattern
+    alone, in no time. A policy of the point gets the document's test, one of a Gymnasium environment its episodes.
+    The exit code is 0 whatever comes out.
+
+    Attributes:
+        policy: the folder that toddle navigate ppo left.
+        driver: who steers: the policy; a baseline that turns to the goal and walks there; the guide that plans the
+            shortest way around obstacles; a script (--script).
+        script: velocities from a file of lines "t vx vy omega", for --driver script.
+        episodes: how many goals.
+        pattern: judge on the walking pattern alone.
+        robot: another robot than the policy was trained on: a name or a description's path.
+        config: a TOML file that says what a humanoid's description leaves out.
+        circles: at most so many obstacles; as in training unless given.
+        people: so many walk around; as in training unless given.
+        noise: of the sensors; 1 for those of a good robot.
+        jobs: processes; one for each core unless given.
+        seed: of the goals; far from those of training unless you choose otherwise.
+        out: the folder to leave; runs/evaluate unless given.
+        json: print one JSON object with the figures, and nothing else.
+    """
+
+    policy: Path | None = None
+    driver: Literal["policy", "baseline", "guide", "script"] = "policy"
+    script: Path | None = None
+    episodes: int = 100
+    pattern: bool = False
+    robot: str | None = None
+    config: Path | None = None
+    circles: int | None = None
+    people: int | None = None
+    noise: float | None = None
+    jobs: int | None = None
+    seed: int = 1000
+    out: Path | None = None
+    json: bool = False
+
+
+def main(argv: Sequence[str]) -> int:
+    """Judge, and return the exit code."""
+    asked = parse(Evaluate, argv, prog=_PROG)
+    _check(asked)
+    if asked.driver == "policy":
+        assert asked.policy is not None
+        from toddle.outside.navigation.policy_files import load_policy
+
+        policy = load_policy(asked.policy)
+        if asked.pattern or policy.source.get("task") == "point" or "env" in policy.source:
+            from toddle.cli.navigate_trial import try_out
+
+            return try_out(asked, policy)
+    return _judge_in_physics(asked)
+
+
+def _check(asked: Evaluate) -> None:
+    """Refuse what contradicts itself before anything heavy is imported."""
+    if asked.driver == "policy" and asked.policy is None:
+        raise BadInput("--policy is missing", where=_PROG, remedy="name the folder that toddle navigate ppo left")
+    if asked.driver != "policy" and (asked.policy is not None or asked.pattern):
+        flag = "--policy" if asked.policy is not None else "--pattern"
+        raise BadInput(f"{flag} is of a policy, and {asked.driver} steers", where=_PROG, remedy="leave one out")
+    if (asked.driver == "script") != (asked.script is not None):
+        raise BadInput("--driver script and --script belong together", where=_PROG, remedy="give both")
+    for name, most in _MOST.items():
+        value = getattr(asked, name)
+        least = 0 if name in ("circles", "people") else 1
+        if value is not None and not least <= value <= most:
+            raise BadInput(f"{value} is out of range", where=f"--{name}", remedy=f"give {least} to {most}")
+    if not 0 <= asked.seed < 2**31:
+        raise BadInput(f"{asked.seed} is out of range", where="--seed", remedy=f"give 0 to {2**31 - 1}")
+    if asked.noise is not None and not 0 <= asked.noise <= 1000:
+        raise BadInput(f"{asked.noise:g} is out of range", where="--noise", remedy="give 0 to 1000")
+
+
+def _judge_in_physics(asked: Evaluate) -> int:
+    from toddle.cli.run_folder import new_folder
+    from toddle.outside.navigation.course import Rules, summary
+    from toddle.outside.navigation.named_tasks import TASKS, source_named
+    from toddle.outside.navigation.physics_batch import run_courses
+    from toddle.outside.navigation.policy_files import load_policy
+    from toddle.outside.navigation.steered import walking_source
+    from toddle.outside.terminal import Reporter, stoppable
+
+    policy = None if asked.policy is None else load_policy(asked.policy)
+    source = TASKS["goal"] if policy is None or asked.policy is None else walking_source(policy, asked.policy)
+    task = source.task if source.task != "point" else "goal"
+    source = source_named(task, robot=asked.robot or source.robot, sideways=source.sideways, told=source.told,
+        circles=source.circles if asked.circles is None else asked.circles,
+        people=source.people if asked.people is None else asked.people)  # fmt: skip
+    robot = "heicub" if source.robot == "unicycle" else source.robot
+    courses = draw_courses(asked.seed, asked.episodes, source.circles, source.people, Rules().seconds)
+    folder = new_folder(asked.out, "evaluate")
+    with stoppable() as stop, Reporter(f"{robot} in physics, courses", len(courses), quiet=asked.json) as reporter:
+        done: list[Finish] = []
+
+        def told(_: int, finish: Finish) -> None:
+            done.append(finish)
+            won = sum(f.outcome.name == "WON" for f in done)
+            reporter.tell(len(done), f"{won} of {len(done)} reached")
+
+        finishes = run_courses(
+            _recipe(asked, robot, source.robot_config), courses, Rules(told=source.told), world=_world(asked),
+            seed=asked.seed, processes=asked.jobs, progress=told, stopped=lambda: stop.asked,
+        )  # fmt: skip
+    pairs = [(course, finish) for course, finish in zip(courses, finishes, strict=True) if finish is not None]
+    if not pairs:
+        return 130
+    found = summary([finish for _, finish in pairs])
+    figures = {
+        "env": source.task, "robot": robot, "driver": asked.driver, "physics": True, "seed": asked.seed,
+        "circles": source.circles, "people": source.people, **_judged(found),
+        **({} if policy is None else learned_figures(policy.figures)),
+    }  # fmt: skip
+    _leave(folder, figures, pairs, f"{robot}: {found['won']} of {len(pairs)} goals")
+    tell(figures, folder, as_json=asked.json)
+    return 130 if stop.asked else 0
+
+
+def draw_courses(seed: int, count: int, circles: int, people: int, seconds: float) -> list[Course]:
+    """Goals, obstacles and people that training never saw; each can be solved, by an independent planner."""
+    from dataclasses import replace
+
+    from toddle.navigate.scenarios.planner import solvable_layouts
+    from toddle.outside.navigation.course import courses_of, strolls
+
+    layouts, _, _ = solvable_layouts(seed, count, circles=circles)
+    courses = list(courses_of(layouts))
+    if people:
+        courses = [
+            replace(course, people=strolls(seed + number, course.goal, people, seconds, clear=0.95))
+            for number, course in enumerate(courses)
+        ]
+    return courses
+
+
+def learned_figures(figures: Any) -> dict[str, Any]:
+    """What training told of itself."""
+    names = ("steps", "train_seconds", "compile_seconds", "steps_per_second")
+    return {name: figures[name] for name in names if name in figures}
+
+
+def _recipe(asked: Evaluate, robot: str, config: str | None) -> Any:
+    from toddle.outside.navigation.guided import Guided
+    from toddle.outside.navigation.physics_batch import Recipe, baseline, same
+    from toddle.outside.navigation.steered import learned, scripted
+
+    file = asked.config or (None if config is None else Path(config))
+    match asked.driver:
+        case "policy":
+            return Recipe(learned, (asked.policy,), robot, file)
+        case "baseline":
+            return Recipe(baseline, (), robot, file)
+        case "guide":
+            return Recipe(same, (Guided(),), robot, file)
+        case "script":
+            return Recipe(scripted, (asked.script,), robot, file)
+
+
+def _world(asked: Evaluate) -> Any:
+    from dataclasses import asdict
+
+    from toddle.outside.simulation.disturbances import Noise, WorldOptions
+
+    if not asked.noise:
+        return None
+    return WorldOptions(noise=Noise(*(asked.noise * deviation for deviation in asdict(Noise()).values())))
+
+
+def _judged(found: dict[str, Any]) -> dict[str, Any]:
+    from toddle.outside.navigation.statistics import wilson
+
+    low, high = wilson(found["won"], found["courses"])
+    return {
+        "episodes": found["courses"], "success_rate": found["success_rate"], "wilson_low": low, "wilson_high": high,
+        "wins": found["won"], "losses": found["courses"] - found["won"], "collisions": found["collisions"],
+        "falls": found["falls"], "late": found["late"], "lost": found["lost"], "seconds_mean": found["seconds_mean"],
+        "spl": found["spl_mean"], "zmp_error_mean_cm": 100 * found["zmp_error_mean"],
+    }  # fmt: skip
+
+
+def _leave(folder: Path, figures: dict[str, Any], pairs: list[tuple[Course, Finish]], title: str) -> None:
+    from toddle.outside.files import write_json
+    from toddle.outside.navigation.course_pictures import all_paths, cases
+
+    courses, finishes = [course for course, _ in pairs], [finish for _, finish in pairs]
+    write_json(folder / "figures.json", figures)
+    rows = [
+        {"goal": list(c.goal), "outcome": f.outcome.name.lower(), "seconds": f.seconds, "spl": f.spl} for c, f in pairs
+    ]
+    write_json(folder / "courses.json", {"courses": rows})
+    all_paths(folder / "paths.png", courses, finishes, title=title)
+    cases(folder / "cases.png", courses[:4], finishes[:4], title=title)
+
+
+def tell(figures: dict[str, Any], folder: Path, *, as_json: bool) -> None:
+    """The figures on standard output: one JSON object, or a table."""
+    from toddle.outside.files import finite
+    from toddle.outside.terminal import print_table
+
+    if as_json:
+        print(json.dumps(finite({**figures, "folder": str(folder)})))
+        return
+    shown = [(name.replace("_", " "), _shown(value)) for name, value in figures.items()]
+    print_table(str(figures.get("env", "")), ("", "this run"), shown)
+    print(f"figures and pictures: {folder}")
+    sys.stdout.flush()
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

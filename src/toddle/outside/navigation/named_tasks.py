@@ -1,0 +1,128 @@
+"""The tasks that have a name: plain values that travel in a run's folder, and the task that they stand for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from toddle.failures import BadInput, unknown_name
+from toddle.navigate.task import Task
+from toddle.navigate.tasks.point import PointTask
+from toddle.navigate.tasks.unicycle import unicycle
+from toddle.navigate.tasks.walker import WalkerTask
+from toddle.robots.humanoids import load_humanoid
+
+SAMPLES = 4
+"""Iterations of the walking pattern that one action lasts."""
+
+_MOST = {"circles": 20, "people": 10}
+
+
+@dataclass(frozen=True)
+class TaskSource:
+    """What a task is made of.
+
+    Attributes:
+        task: its name.
+        robot: who walks: a name, or the path of a description; "unicycle": an ideal robot on wheels. Of no meaning
+            for the point.
+        robot_config: a TOML file beside the robot's description.
+        circles: at most so many obstacles.
+        people: so many walk around.
+        sideways: whether it may be walked aside.
+        observe: what the policy is shown; see `WalkerTask`.
+        told: whether the walking pattern is told of obstacles, and may evade them by itself.
+        solver: of the walking pattern; see `toddle.outside.navigation.nmpc_walks`.
+    """
+
+    task: Literal["point", "goal", "obstacles", "people"] = "goal"
+    robot: str = "heicub"
+    robot_config: str | None = None
+    circles: int = 0
+    people: int = 0
+    sideways: bool = False
+    observe: Literal["document", "full"] = "document"
+    told: bool = True
+    solver: Literal["native", "batch", "auto"] = "auto"
+
+    def __post_init__(self) -> None:
+        """Refuses what makes no task.
+
+        Raises:
+            BadInput: which number, and the remedy.
+        """
+        for name, most in _MOST.items():
+            count = getattr(self, name)
+            if not 0 <= count <= most:
+                raise BadInput(f"{count} is out of range", where=f"--{name}", remedy=f"give 0 to {most}")
+
+
+TASKS = {
+    "point": TaskSource("point"),
+    "goal": TaskSource("goal"),
+    "obstacles": TaskSource("obstacles", circles=5, observe="full"),
+    "people": TaskSource("people", circles=2, people=3, observe="full"),
+}
+"""Every task by its name: the document's two, and what goes beyond it."""
+
+
+def source_named(name: str, **changes: Any) -> TaskSource:
+    """A task by its name, with what is given otherwise; None leaves it.
+
+    Raises:
+        BadInput: there is no such task, or a change makes none.
+    """
+    if name not in TASKS:
+        raise unknown_name("task", name, TASKS, where="toddle navigate ppo")
+    source = TASKS[name]
+    given = {key: value for key, value in changes.items() if value is not None}
+    if name == "point" and (useless := [key for key in given if given[key] != getattr(source, key)]):
+        raise BadInput("the point knows no such thing", where=f"--{useless[0]}", remedy="leave it out")
+    if (given.get("circles") or given.get("people")) and source.observe == "document":
+        given["observe"] = "full"
+    return replace(source, **given)
+
+
+def source_from(facts: Mapping[str, Any]) -> TaskSource:
+    """The same from what a run's folder holds.
+
+    Raises:
+        BadInput: the facts are those of no task.
+    """
+    known = {part.name for part in fields(TaskSource)}
+    if not set(facts) <= known or facts.get("task") not in TASKS:
+        raise BadInput("it was learned on no task of toddle's", where="policy", remedy="name another --policy")
+    return TaskSource(**facts)
+
+
+def facts_of(source: TaskSource) -> dict[str, Any]:
+    """Plain values."""
+    return asdict(source)
+
+
+def make_task(source: TaskSource) -> Task[Any]:
+    """The task itself.
+
+    Raises:
+        BadInput: the robot can't be used.
+    """
+    if source.task == "point":
+        return PointTask()
+    return walker_task(source)
+
+
+def walker_task(source: TaskSource) -> WalkerTask:
+    """A task with a walker; see `make_task`."""
+    if source.robot == "unicycle":
+        walks = unicycle(seconds=0.4)
+    else:
+        from toddle.outside.navigation.nmpc_walks import nmpc_walks
+
+        config = None if source.robot_config is None else Path(source.robot_config)
+        walks = nmpc_walks(load_humanoid(source.robot, config), solver=source.solver, hold=SAMPLES)
+    return WalkerTask(
+        walks, circles=source.circles, people=source.people, sideways=source.sideways, observe=source.observe,
+        told=source.told,
+    )  # fmt: skip
