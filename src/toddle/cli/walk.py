@@ -23,6 +23,7 @@ DEFAULT_ROBOT = "heicub"
 _LONGEST = 3600.0  # [s]
 _FARTHEST = 1000.0  # [m]
 _HARDEST = 1000.0  # [N s]
+_THERE = 60.0  # a policy takes no longer [s]
 _PROG = "toddle walk"
 
 
@@ -39,9 +40,12 @@ class Walk:
         command: walk at this velocity: ahead, to the left [m/s], turning left [rad/s].
         script: walk by a file of lines "t vx vy omega".
         keys: drive it yourself, from this terminal.
+        policy: walk by a policy that toddle navigate left in this folder, to --goal.
+        goal: where the policy is to walk: x ahead, y to the left of the start [m].
         scenario: walk one that has a name: straight, sideways, curve, turn, diagonal, obstacle, stop-and-go; straight
             unless given.
-        for_: how long to walk [s]; 20 unless the scenario or the script says otherwise, with --keys until you quit.
+        for_: how long to walk [s]; 20 unless the scenario or the script says otherwise, with --keys until you quit,
+            with --policy until it is there, at most 60.
         iterations: how long, in iterations of the walking pattern.
         push: push the chest: N.s@t, such as 6@5 for 6 N s at 5 s, or 6@5@90 towards the left; may be given again.
         obstacle: a tall cylinder: x, y and radius [m]; may be given again.
@@ -65,6 +69,8 @@ class Walk:
     command: tuple[float, float, float] | None = None
     script: Path | None = None
     keys: bool = False
+    policy: Path | None = None
+    goal: tuple[float, float] | None = None
     scenario: str | None = None
     for_: float | None = None
     iterations: int | None = None
@@ -98,8 +104,8 @@ class Task(NamedTuple):
     """What is to be walked.
 
     Attributes:
-        name: of the scenario, or "command", "script", "keys".
-        legs: the velocities over time; nothing with keys.
+        name: of the scenario, or "command", "script", "keys", "policy".
+        legs: the velocities over time; nothing with keys or a policy.
         seconds: how long.
         circles: obstacles, in the frame in which the robot starts.
         pushes: at the chest.
@@ -112,7 +118,7 @@ class Task(NamedTuple):
     pushes: tuple[Push, ...]
 
 
-_OF_A_BODY = ("keys", "push", "noise", "delay", "lag", "friction", "tilt", "mass_error", "video")
+_OF_A_BODY = ("keys", "policy", "push", "noise", "delay", "lag", "friction", "tilt", "mass_error", "video")
 _RANGES = {
     "for_": (0.01, _LONGEST, "s"), "deadline": (0.0, 10_000.0, "ms"), "noise": (0.0, 1000.0, ""),
     "delay": (0.0, 1000.0, "ms"), "lag": (0.0, 1000.0, "ms"), "friction": (0.01, 10.0, ""),
@@ -136,7 +142,11 @@ def main(argv: Sequence[str]) -> int:
 
 def _check(asked: Walk) -> None:
     """Refuse what contradicts itself or is out of range before anything heavy is imported."""
-    _one_of(asked, ("command", "script", "keys", "scenario"))
+    _one_of(asked, ("command", "script", "keys", "policy", "scenario"))
+    if (asked.policy is None) != (asked.goal is None):
+        raise BadInput("--policy and --goal belong together", where=_PROG, remedy="give both")
+    if asked.goal is not None and not 0 < math.hypot(*asked.goal) <= _FARTHEST:
+        raise BadInput("it is here already, or too far", where="--goal", remedy=f"give x and y up to {_FARTHEST:g} m")
     _one_of(asked, ("for_", "iterations"))
     for name, (low, high, unit) in _RANGES.items():
         value = getattr(asked, name)
@@ -205,6 +215,8 @@ def task_of(asked: Walk, gait: Gait) -> Task:
     name, legs, seconds = "command", (Leg(0.0, Velocity(*(asked.command or (0.0, 0.0, 0.0)))),), 20.0
     if asked.keys:
         name, legs, seconds = "keys", (), _LONGEST
+    elif asked.policy is not None:
+        name, legs, seconds = "policy", (), _THERE
     elif asked.script is not None:
         legs = read_script(asked.script)
         name, seconds = "script", script_seconds(legs)

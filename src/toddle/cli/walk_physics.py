@@ -17,6 +17,7 @@ from toddle.failures import BadInput, ToddleError
 
 if TYPE_CHECKING:
     from toddle.cli.walk import Task, Walk
+    from toddle.outside.navigation.steered import Steered
     from toddle.outside.simulation.disturbances import WorldOptions
     from toddle.outside.simulation.humanoid import HumanoidSimulation
     from toddle.outside.teleoperation.keys import Keyboard
@@ -53,11 +54,12 @@ def walk_in_physics(asked: Walk) -> int:
     simulation = HumanoidSimulation(humanoid, options)
     folder = new_folder(asked.out, f"walk-{humanoid.name}")
     warm_up(walks, simulation)
+    steered = _steered(asked, humanoid, simulation, task)
     recorder = Recorder()
     watch = Watch(recorder, simulation)
     with _filming(asked, simulation, folder) as film:
         try:
-            until, stopped = _walk(task, walks, simulation, watch, film)
+            until, stopped = _walk(asked, task, walks, simulation, steered, watch, film)
         except Exception:
             write_trajectory(folder / "trajectory.parquet", recorder.record())
             raise
@@ -84,7 +86,13 @@ def _capped(gait: Gait) -> Callable[[Velocity], Velocity]:
 
 
 def _walk(
-    task: Task, walks: Walker | Follower, simulation: HumanoidSimulation, watch: Watch, film: Callable[[float], None]
+    asked: Walk,
+    task: Task,
+    walks: Walker | Follower,
+    simulation: HumanoidSimulation,
+    steered: Steered | None,
+    watch: Watch,
+    film: Callable[[float], None],
 ) -> tuple[float, bool]:
     """Walk to the end: until when it was commanded [s], and whether somebody interrupted it."""
     from toddle.outside.teleoperation.commands import follow, until
@@ -93,14 +101,15 @@ def _walk(
     from toddle.outside.walk_run import Heard
 
     with ExitStack() as stack:
-        keyboard = None if task.legs else stack.enter_context(Keyboard(walks.gait.fastest))
+        keyboard = stack.enter_context(Keyboard(walks.gait.fastest)) if asked.keys else None
         stop = stack.enter_context(stoppable())
-        source = follow(task.legs, task.seconds) if keyboard is None else _for(keyboard, task.seconds)
+        steering = keyboard or steered
+        source = follow(task.legs, task.seconds) if steering is None else _for(steering, task.seconds)
         heard = Heard(until(lambda: stop.asked, source))
         show = _shown(stack, task, walks, keyboard)
         try:
             watch(
-                _moments(task, walks, simulation, heard),
+                _moments(task, walks, simulation, steered, heard),
                 tell=show,
                 film=film,
                 real_time=lambda: keyboard is not None and not keyboard.ended,
@@ -110,20 +119,36 @@ def _walk(
         return heard.until, stop.asked
 
 
-def _for(keyboard: Keyboard, seconds: float) -> Callable[[float], Any]:
-    return lambda t: keyboard(t) if t < seconds else None
+def _for(source: Callable[[float], Velocity | None], seconds: float) -> Callable[[float], Velocity | None]:
+    return lambda t: source(t) if t < seconds else None
+
+
+def _steered(asked: Walk, humanoid: Humanoid, simulation: HumanoidSimulation, task: Task) -> Steered | None:
+    """The robot with a policy on top, if one is asked for."""
+    if asked.policy is None or asked.goal is None:
+        return None
+    from toddle.outside.navigation.steered import Steered, learned
+
+    driver = learned(humanoid, asked.policy)
+    return Steered(simulation, driver, asked.goal, task.circles, near=driver.task.near)
 
 
 def _moments(
-    task: Task, walks: Walks[Any], simulation: HumanoidSimulation, heard: Callable[[float], Any]
+    task: Task,
+    walks: Walks[Any],
+    simulation: HumanoidSimulation,
+    steered: Steered | None,
+    heard: Callable[[float], Any],
 ) -> Iterator[Moment]:
     """The walk; pushes are told to the world once it has begun, since that forgets them at the start."""
     from toddle.walk.loop import walk
 
-    for number, moment in enumerate(walk(walks, simulation, heard, circles=task.circles)):
+    for number, moment in enumerate(walk(walks, steered or simulation, heard, circles=task.circles)):
         if number == 0:
             for push in task.pushes:
                 simulation.push(push.impulse, math.radians(push.direction), start=push.t)
+        if steered is not None:
+            steered.allowed = moment.allowed
         yield moment
 
 
