@@ -34,7 +34,8 @@ class Moments(NamedTuple):
 
     def normalised(self, x: Float[Array, "*batch numbers"]) -> Float[Array, "*batch numbers"]:
         """In deviations from the mean, at most 10."""
-        return jnp.clip((x - self.mean) / jnp.sqrt(self.variance + _LEAST), -_FARTHEST, _FARTHEST)
+        mean, deviation = (jnp.broadcast_to(part, x.shape) for part in (self.mean, jnp.sqrt(self.variance + _LEAST)))
+        return jnp.clip((x - mean) / deviation, -_FARTHEST, _FARTHEST)
 
 
 def unseen(numbers: int) -> Moments:
