@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from gymnasium.error import DependencyNotInstalled, UnregisteredEnv
+from gymnasium.envs.registration import load_env_creator
+from gymnasium.error import DependencyNotInstalled
 from gymnasium.vector import AutoresetMode, VectorEnv
 from jaxtyping import Float32, Shaped
 
@@ -89,16 +90,14 @@ def opened(name: str, actors: int) -> tuple[VectorEnv, GymSpaces]:
     """
     try:
         env = _made(name, actors)
-    except UnregisteredEnv:
-        raise unknown_name("environment", name, gymnasium.registry, where="--env") from None
+    except BadInput:
+        raise
     except ModuleNotFoundError as error:
         raise _bad(name, f"no module named {error.name}", "install what it needs") from None
     except DependencyNotInstalled as error:
         raise _bad(name, _first(error), "install what it needs") from None
-    except BadInput:
-        raise
     except Exception as error:  # a stranger's environment: anything may go wrong
-        raise _bad(name, f"{type(error).__name__}: {_first(error)}", "it must be made without arguments") from None
+        raise _bad(name, f"{type(error).__name__}: {_first(error)}", "see what gymnasium.make makes of it") from None
     try:
         return env, _spaces(name, env)
     except BadInput:
@@ -107,13 +106,18 @@ def opened(name: str, actors: int) -> tuple[VectorEnv, GymSpaces]:
 
 
 def _made(name: str, actors: int) -> VectorEnv:
-    spec = gymnasium.spec(name)
+    module, _, bare = name.rpartition(":")
+    if module:
+        load_env_creator(f"{module}:__name__")  # imports it
+    spec = gymnasium.registry.get(bare)
+    if spec is None:
+        raise unknown_name("environment", bare, gymnasium.registry, where="Gymnasium")
     if spec.vector_entry_point is not None:
-        env = gymnasium.make_vec(name, actors, vectorization_mode="vector_entry_point")
-        if isinstance(env.metadata.get("autoreset_mode"), AutoresetMode) or spec.entry_point is None:
+        env = gymnasium.make_vec(bare, actors, vectorization_mode="vector_entry_point")
+        if spec.entry_point is None or isinstance(env.metadata.get("autoreset_mode"), AutoresetMode):
             return env
         env.close()
-    return gymnasium.make_vec(name, actors, "sync", vector_kwargs={"autoreset_mode": AutoresetMode.SAME_STEP})
+    return gymnasium.make_vec(bare, actors, "sync", vector_kwargs={"autoreset_mode": AutoresetMode.SAME_STEP})
 
 
 def _spaces(name: str, env: VectorEnv) -> GymSpaces:

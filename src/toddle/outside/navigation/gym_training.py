@@ -57,44 +57,28 @@ class GymTraining:
 
     def advance(self, training: Training) -> tuple[Training, Report]:
         """Collect, then learn: one update."""
-        acting, _ = jax.random.split(training.key)
-        drawing, beginning = jax.random.split(acting)
-        actors = training.actors
-        if self._begins_anew(training):
-            seed = int(jax.random.randint(beginning, (), 0, 2**31 - 1 - self.config.actors))
-            fresh = _began(self.config, jnp.asarray(self.copies.begin(seed)))
-            actors = fresh._replace(discounted=actors.discounted)
-        actors, rows = self._collect(training.network, training.observations, actors, drawing)
+        actors, rows = self.collect(training)
         training, report = _learned(self.config, training._replace(actors=actors), rows)
         self._next = _bytes(training.key)
         return training, report
 
-    def close(self) -> None:
-        """Gives back what the copies hold."""
-        self.copies.close()
-
-    def _begins_anew(self, training: Training) -> bool:
-        """Where it was asked for, and where the copies are not where this run left them."""
-        due = self.anew_every > 0 and int(training.updates) % self.anew_every == 0
-        return due or self._next != _bytes(training.key)
-
-    def _collect(
-        self, network: ActorCritic, moments: Moments, actors: Actors, key: PRNGKeyArray
-    ) -> tuple[Actors, _Rows]:
+    def collect(self, training: Training) -> tuple[Actors, HostRows]:
         """T steps of each copy, in as many calls as the slowest needs: one that begins anew in a call of its own is
         late. What others do beyond T is lost: their next rows start from there.
         """
+        drawing, beginning = jax.random.split(jax.random.split(training.key)[0])
+        actors = self._anew(training.actors, beginning) if self._begins_anew(training) else training.actors
         seen, started, memory = np.asarray(actors.observation), np.asarray(actors.started), actors.memory
         total, length, discounted = (np.asarray(part) for part in (actors.total, actors.length, actors.discounted))
         gamma, table, call = np.float32(self.config.gamma), _Table(self.config), 0
         while not table.full:
             taken, drawn, log_prob, before, memory = _act(
-                self.config, network, moments, seen, started, memory, key, np.int32(call)
+                self.config, training.network, training.observations, seen, started, memory, drawing, np.int32(call)
             )
             found = self.copies.step(np.asarray(taken))
             total, length = total + found.reward, length + found.real.astype(np.int32)
             discounted = gamma * discounted + found.reward
-            row = _Rows(
+            row = HostRows(
                 seen, found.after, np.asarray(drawn), np.asarray(log_prob), found.reward, found.terminated,
                 found.truncated, started, np.asarray(before), np.asarray(memory), total, length, discounted,
             )  # fmt: skip
@@ -105,8 +89,23 @@ class GymTraining:
         going = (jnp.asarray(part) for part in (total, length, discounted))
         return Actors((), jnp.asarray(seen), jnp.asarray(started), memory, *going), table.rows
 
+    def close(self) -> None:
+        """Gives back what the copies hold."""
+        self.copies.close()
 
-class _Rows(NamedTuple):
+    def _begins_anew(self, training: Training) -> bool:
+        """Where it was asked for, and where the copies are not where this run left them."""
+        due = self.anew_every > 0 and int(training.updates) % self.anew_every == 0
+        return due or self._next != _bytes(training.key)
+
+    def _anew(self, actors: Actors, key: PRNGKeyArray) -> Actors:
+        """All copies in new episodes; the sum that rewards are normalised by goes on."""
+        seed = int(jax.random.randint(key, (), 0, 2**31 - 1 - self.config.actors))
+        fresh = _began(self.config, jnp.asarray(self.copies.begin(seed)))
+        return fresh._replace(discounted=actors.discounted)
+
+
+class HostRows(NamedTuple):
     """What the copies saw and did, see `toddle.navigate.ppo.collect.Row`; with a leading axis, in many steps."""
 
     seen: Shaped[np.ndarray, "..."]
@@ -130,21 +129,21 @@ class _Table:
     def __init__(self, config: PpoConfig) -> None:
         self._horizon, self._filled = config.horizon, np.zeros(config.actors, int)
         self._copies = np.arange(config.actors)
-        self._rows: _Rows | None = None
+        self._rows: HostRows | None = None
 
     @property
     def full(self) -> bool:
         return bool((self._filled == self._horizon).all())
 
     @property
-    def rows(self) -> _Rows:
+    def rows(self) -> HostRows:
         assert self._rows is not None
         return self._rows
 
-    def add(self, row: _Rows, real: Bool[np.ndarray, " actors"]) -> None:
+    def add(self, row: HostRows, real: Bool[np.ndarray, " actors"]) -> None:
         """What each copy did in a call, where it made a step and its column has room."""
         if self._rows is None:
-            self._rows = _Rows(*(np.zeros((self._horizon, *part.shape), part.dtype) for part in row))
+            self._rows = HostRows(*(np.zeros((self._horizon, *part.shape), part.dtype) for part in row))
         who = self._copies[real & (self._filled < self._horizon)]
         at = self._filled[who]
         for column, part in zip(self._rows, row, strict=True):
@@ -182,7 +181,7 @@ def _act(
 
 
 @partial(jax.jit, static_argnums=0)
-def _learned(config: PpoConfig, training: Training, rows: _Rows) -> tuple[Training, Report]:
+def _learned(config: PpoConfig, training: Training, rows: HostRows) -> tuple[Training, Report]:
     """The update, by what was collected on the host."""
     late = rows.truncated & ~rows.terminated
     known = rows._asdict()
