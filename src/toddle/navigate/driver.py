@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from toddle.navigate.scenarios.driver import drive
 from toddle.navigate.tasks.scan import scan
@@ -105,7 +105,7 @@ class Recall(NamedTuple):
 
     memory: Array
     seen: Float[Array, " rays"]
-    first: bool
+    first: Bool[Array, ""]
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,7 @@ class Learned:
 
     def start(self) -> Recall:
         """The policy's own memory, and nothing seen."""
-        return Recall(self.policy.start(), jnp.ones(self.task.scan_rays), True)
+        return Recall(self.policy.start(), jnp.ones(self.task.scan_rays), jnp.array(True))
 
     def decide(self, memory: Recall, situation: Situation) -> tuple[Velocity, Recall]:
         """What the policy thinks best; what is not finite asks to stand."""
@@ -135,7 +135,7 @@ class Learned:
         given = [jnp.asarray(np.asarray(part), jnp.float32) for part in numbers]
         velocity, own, seen = _decision(self.policy, self.task)(memory.memory, memory.seen, memory.first, *given)
         vx, vy, omega = np.asarray(velocity).astype(float).tolist()
-        return Velocity(vx, vy, omega), Recall(own, seen, False)
+        return Velocity(vx, vy, omega), Recall(own, seen, jnp.array(False))
 
 
 @lru_cache(maxsize=16)
@@ -143,7 +143,7 @@ def _decision(policy: Chooses, task: WalkerTask) -> Callable[..., tuple[Array, A
     """One compiled decision of a policy."""
 
     def decision(
-        memory: Array, last: Array, first: bool, place: Array, goal: Array, velocity: Array, circles: Array
+        memory: Array, last: Array, first: Array, place: Array, goal: Array, velocity: Array, circles: Array
     ) -> tuple[Array, Array, Array]:
         seen = scan(place, circles, task.scan_rays, task.reach)
         change = jnp.where(first, 0.0, (seen - last) / task.dt)
