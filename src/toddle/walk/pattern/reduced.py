@@ -118,7 +118,7 @@ class Reduced:
             if not moving:
                 return at, 0.0
             support, other = self._first(at, velocity)
-            shift = _shift(gait)
+            shift = weight_shift(gait)
             begun = PlanState(
                 at.com,
                 support,
@@ -145,7 +145,7 @@ class Reduced:
         return (left, right) if velocity.vy + 0.1 * velocity.omega <= 0 else (right, left)
 
 
-def _shift(gait: Gait) -> float:
+def weight_shift(gait: Gait) -> float:
     """Half a step's time, in whole samples [s]."""
     return max(round(gait.step_time / 2 / gait.sample), 1) * gait.sample
 
