@@ -17,7 +17,7 @@ from toddle.failures import BadInput
 from toddle.navigate.scenarios.layouts import Layout
 from toddle.navigate.task import Continuous, Outcome, Step, Task
 from toddle.navigate.tasks.people import RADIUS, People
-from toddle.navigate.tasks.rewards import Rewards
+from toddle.navigate.tasks.rewards import DOCUMENT, Rewards
 from toddle.navigate.tasks.unicycle import unicycle
 from toddle.navigate.tasks.walker import Course, WalkerTask
 from toddle.navigate.walks import Walks
@@ -25,9 +25,11 @@ from toddle.navigate.walks import Walks
 WALKS = unicycle()
 KEY = jax.random.key(0)
 TASKS = {
-    "document": WalkerTask(WALKS, far=3.2, seconds=15.0),
-    "circles": WalkerTask(WALKS, circles=5, observe="full", seconds=15.0, far=3.2),
-    "people": WalkerTask(WALKS, circles=3, people=4, observe="full", sideways=True, hold=4, told=True, far=3.5),
+    "document": WalkerTask(WALKS, far=3.2, seconds=15.0, rewards=DOCUMENT),
+    "circles": WalkerTask(WALKS, circles=5, observe="full", seconds=15.0, far=3.2, rewards=DOCUMENT),
+    "people": WalkerTask(
+        WALKS, circles=3, people=4, observe="full", sideways=True, hold=4, told=True, far=3.5, rewards=DOCUMENT
+    ),
 }
 
 

@@ -21,7 +21,10 @@ _SCALE = 1 / 600
 
 @dataclass(frozen=True)
 class Rewards:
-    """Weights of the terms. As they stand: the document's, all divided by 600, and punished ends, which it lacks.
+    """Weights of the terms.
+
+    As they stand, the document's divided by 600, but a tenth of the frontal term and a greater reward for the goal; and
+    failures are punished, which the document does not say. Its own proportions: `DOCUMENT`.
 
     Attributes:
         goal: for each metre nearer to the goal [1/m].
@@ -32,9 +35,9 @@ class Rewards:
     """
 
     goal: float = 6e3 * _SCALE
-    frontal: float = 2e3 * _SCALE
+    frontal: float = 2e2 * _SCALE
     late: float = 1e-1 * _SCALE
-    won: float = 100 * _SCALE
+    won: float = 10.0
     failed: float = -10.0
 
     def __call__(
@@ -57,3 +60,7 @@ class Rewards:
         failed = jnp.stack([outcome == failure for failure in failures]).any()
         end = end + jnp.where(failed, self.failed, 0.0)
         return self.goal * nearer + self.frontal * turned - self.late * time + end
+
+
+DOCUMENT = Rewards(frontal=2e3 * _SCALE, won=100 * _SCALE)
+"""The document's proportions. Arriving is worth 17 mm of the way: who learns may stop short of the goal."""
