@@ -7,6 +7,7 @@ on its walking pattern, each of which an independent planner can reach.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import jax
@@ -31,6 +32,14 @@ def judge(task: Task[Any], policy: Policy, seed: int, episodes: int) -> dict[str
     if isinstance(task, WalkerTask):
         return walked(task, policy, seed, episodes)
     return tested(task, policy, seed)
+
+
+def score(figures: Mapping[str, Any]) -> float:
+    """What the better of two policies has more of: wins; losses count ten times; then speed."""
+    if "wins_least" in figures:
+        return float(figures["wins"] - 10 * figures["losses"])
+    slow = figures["seconds_mean"] if figures["wins"] else 0.0
+    return float(figures["wins"] - figures["collisions"] - figures["falls"] - 1e-3 * slow)
 
 
 def tested(task: Task[Any], policy: Policy, seed: int) -> dict[str, Any]:
