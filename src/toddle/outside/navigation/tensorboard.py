@@ -1,0 +1,67 @@
+"""What TensorBoard shows of a run: the parts of its reports as scalars over the steps made."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from tensorboardX import SummaryWriter
+
+from toddle.navigate.task import Outcome
+
+TAGS = {
+    "reward": "step/reward",
+    "return_": "episode/return",
+    "length": "episode/length",
+    "policy_loss": "loss/policy",
+    "value_loss": "loss/value",
+    "entropy": "policy/entropy",
+    "kl": "policy/kl",
+    "clipped": "policy/clipped",
+    "deviation": "policy/deviation",
+    "explained": "critic/explained",
+    "rate": "learning/rate",
+    "gradient": "learning/gradient",
+}
+_OF_EPISODES = ("return_", "length")
+
+
+class Board:
+    """Event files in one folder, and nowhere else.
+
+    Use it in a ``with`` block: what was told last is written when it ends.
+    """
+
+    def __init__(self, folder: Path, purge_from: int | None = None) -> None:
+        """Opens a new event file.
+
+        Args:
+            folder: where.
+            purge_from: a resumed run begins after so many steps: later ones of earlier files are hidden.
+        """
+        self._writer = SummaryWriter(str(folder), purge_step=purge_from)
+
+    def __enter__(self) -> Board:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._writer.close()
+
+    def tell(self, rows: Mapping[str, np.ndarray], steps_per_second: float) -> None:
+        """Updates that were made.
+
+        Args:
+            rows: parts of `toddle.navigate.ppo.training.Report` by name, a row an update.
+            steps_per_second: at which they came.
+        """
+        for row, steps in enumerate(rows["steps"].tolist()):
+            episodes = int(rows["episodes"][row])
+            for name, tag in TAGS.items():
+                if episodes or name not in _OF_EPISODES:
+                    self._writer.add_scalar(tag, float(rows[name][row]), steps)
+            if episodes:
+                for outcome in tuple(Outcome)[1:]:
+                    share = float(rows["outcomes"][row, outcome]) / episodes
+                    self._writer.add_scalar(f"episode/{outcome.name.lower()}", share, steps)
+            self._writer.add_scalar("speed/steps_per_second", steps_per_second, steps)

@@ -1,0 +1,266 @@
+"""Runs: to the end, stopped and taken up again bit for bit, into trouble; what they leave and what TensorBoard shows."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from tensorboardX.proto.event_pb2 import Event
+from tensorboardX.record_writer import masked_crc32c
+
+from toddle.failures import BadInput
+from toddle.navigate.policy import Policy
+from toddle.navigate.ppo.config import PpoConfig
+from toddle.navigate.ppo.training import Report, Training, train
+from toddle.navigate.tasks.point import PointTask
+from toddle.outside.navigation import ppo_course
+from toddle.outside.navigation.policy_files import load_policy
+from toddle.outside.navigation.ppo_run import Plan, Run, run
+from toddle.outside.navigation.training_files import load_training
+from toddle.outside.terminal import Stop
+
+TASK = PointTask(longest=20)
+CONFIG = PpoConfig(steps=16 * 11, actors=4, horizon=4, minibatch=16, epochs=1, hidden=(3,), schedule="constant")
+
+
+def plan(folder: Path, **changes: Any) -> Plan:
+    """Of a short run."""
+    return replace(Plan(folder, "point", {"task": "point"}, seed=3, saved_every=4, judged_every=3), **changes)
+
+
+def bits(tree: Any) -> list[bytes]:
+    """Of all leaves."""
+    plain = [
+        jax.random.key_data(x) if jnp.issubdtype(x.dtype, jax.dtypes.prng_key) else x for x in jax.tree.leaves(tree)
+    ]
+    return [np.asarray(x).tobytes() for x in plain]
+
+
+class Asked:
+    """A `Reporter` that asks to stop after so many steps."""
+
+    def __init__(self, after: int = 10**9) -> None:
+        self.after, self.stop, self.told = after, Stop(), list[tuple[int, str]]()
+
+    def tell(self, done: int, news: str) -> None:
+        """Listen."""
+        self.told.append((done, news))
+        self.stop.asked = done >= self.after
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A run to the end."""
+    folder = tmp_path_factory.mktemp("whole")
+    return run(TASK, CONFIG, plan(folder, source={"folder": str(folder)}))
+
+
+def test_a_run_learns_what_train_learns(done: Run) -> None:
+    begun = ppo_course.beginning(TASK, CONFIG, jnp.int32(3), 1)
+    assert CONFIG.updates == 11
+    assert int(done.training.updates) == 11
+    expected, report = train(TASK, CONFIG, begun, 11)
+    assert jax.tree.all(
+        jax.tree.map(functools.partial(np.allclose, rtol=1e-4, atol=1e-5), done.training.network, expected.network)
+    )
+    assert done.history["reward"].shape == (1, 11)
+    np.testing.assert_allclose(done.history["reward"][0], np.asarray(report.reward), rtol=1e-4, atol=1e-5)
+    assert done.history["steps"][0].tolist() == [16 * k for k in range(1, 12)]
+
+
+def test_what_a_run_leaves(done: Run) -> None:
+    folder = Path(done.policy.source["folder"])
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "checkpoint.json", "checkpoints", "policy.json", "policy.safetensors", "tensorboard",
+    ]  # fmt: skip
+    found = load_policy(folder)
+    assert bits((found.network, found.moments)) == bits((done.policy.network, done.policy.moments))
+    figures = done.figures
+    assert (figures["env"], figures["seed"], figures["steps"], figures["stopped"]) == ("point", 3, 176, None)
+    assert figures["steps_per_second"] == pytest.approx(176 / figures["train_seconds"])
+    assert figures["compile_seconds"] > 0
+    assert found.figures == {**figures, "steps_per_second": found.figures["steps_per_second"]}
+    assert (done.stopped, done.diverged) == (None, False)
+
+
+@pytest.mark.parametrize("after", [1, 16 * 5, 16 * 8])
+def test_a_run_that_was_stopped_goes_on_bit_for_bit(tmp_path: Path, done: Run, after: int) -> None:
+    asked = Asked(after)
+    first = run(TASK, CONFIG, plan(tmp_path), reporter=asked, stop=asked.stop)
+    assert first.stopped == "it was asked to stop"
+    assert not first.diverged
+    assert 0 < first.figures["updates"] < 11
+    second = run(TASK, CONFIG, plan(tmp_path), resume=True)
+    assert bits(second.training) == bits(done.training)
+    assert {k: v.tobytes() for k, v in second.history.items()} == {k: v.tobytes() for k, v in done.history.items()}
+    assert second.figures["steps"] == 176
+    assert second.figures["train_seconds"] > first.figures["train_seconds"]
+
+
+def test_a_run_that_was_killed_goes_on_bit_for_bit(tmp_path: Path, done: Run) -> None:
+    """It takes up the last checkpoint; event files of what was lost are hidden by those that come after."""
+
+    class Dies(Asked):
+        def tell(self, done: int, news: str) -> None:
+            if done >= 16 * 6:
+                raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(TASK, CONFIG, plan(tmp_path), reporter=Dies())
+    template = jax.eval_shape(lambda: ppo_course.beginning(TASK, CONFIG, jnp.int32(0), 1))
+    assert int(load_training(tmp_path, template).training.updates) == 4
+    assert bits(run(TASK, CONFIG, plan(tmp_path), resume=True).training) == bits(done.training)
+
+
+def test_a_finished_run_can_be_resumed_for_longer(tmp_path: Path) -> None:
+    short = run(TASK, replace(CONFIG, steps=16 * 2), plan(tmp_path))
+    assert short.figures["updates"] == 2
+    again = run(TASK, replace(CONFIG, steps=16 * 2), plan(tmp_path), resume=True)
+    assert again.figures["updates"] == 2
+    assert bits(again.training) == bits(short.training)
+
+
+def test_other_numbers_are_refused(tmp_path: Path) -> None:
+    run(TASK, replace(CONFIG, steps=16), plan(tmp_path))
+    with pytest.raises(BadInput, match="begun with other numbers"):
+        run(TASK, replace(CONFIG, steps=16, gamma=0.5), plan(tmp_path), resume=True)
+    with pytest.raises(BadInput, match="there is no run here"):
+        run(TASK, CONFIG, plan(tmp_path / "nowhere"), resume=True)
+    with pytest.raises(BadInput, match="saved-every"):
+        plan(tmp_path, saved_every=0)
+
+
+def test_the_best_policy_is_kept(tmp_path: Path) -> None:
+    """A judge that likes the sixth update best; then the last policy isn't the one that is left."""
+    seen: dict[int, Policy] = {}
+
+    def judge(policy: Policy) -> dict[str, float]:
+        number = 3 * (len(seen) + 1)
+        seen[number] = policy
+        return {"score": -abs(number - 6.0), "wins": number}
+
+    found = run(TASK, CONFIG, plan(tmp_path), judge=judge)
+    assert list(seen) == [3, 6, 9, 12]  # the last one after the eleventh
+    assert bits((found.policy.network, found.policy.moments)) == bits((seen[6].network, seen[6].moments))
+    assert bits(found.training.network) != bits(found.policy.network)
+    assert (found.figures["best_update"], found.figures["judged"]) == (6, {"score": 0.0, "wins": 6})
+    again = run(TASK, CONFIG, plan(tmp_path), judge=lambda policy: {"score": -9.0}, resume=True)
+    assert bits(again.policy.network) == bits(seen[6].network)
+
+
+def stepped(poison: int) -> ppo_course.Advance:
+    """Updates one by one; after so many the losses are not finite."""
+
+    def advance(training: Training) -> tuple[Training, Report]:
+        after, reports = ppo_course.updates(TASK, CONFIG, 1, training, jnp.int32(1))
+        report = jax.tree.map(lambda part: part[0], reports)
+        if int(after.updates) < poison:
+            return after, report
+        return after._replace(network=jax.tree.map(lambda w: w * jnp.nan, after.network)), report._replace(
+            value_loss=jnp.float32(jnp.nan)
+        )
+
+    return advance
+
+
+def test_updates_that_are_made_elsewhere(tmp_path: Path, done: Run) -> None:
+    begun = ppo_course.beginning(TASK, CONFIG, jnp.int32(3), 1)
+    found = run(TASK, CONFIG, plan(tmp_path), advance=stepped(99), begun=begun)
+    assert bits(found.training) == bits(done.training)
+    with pytest.raises(BadInput, match="one seed"):
+        run(TASK, CONFIG, plan(tmp_path, seeds=2), advance=stepped(99), begun=begun)
+
+
+def test_a_diverging_run_stops_and_keeps_the_last_good_checkpoint(tmp_path: Path) -> None:
+    begun = ppo_course.beginning(TASK, CONFIG, jnp.int32(3), 1)
+    found = run(TASK, CONFIG, plan(tmp_path), advance=stepped(7), begun=begun)
+    assert found.diverged
+    assert "value loss is no longer finite" in (found.stopped or "")
+    assert found.figures["stopped"] == found.stopped
+    assert load_policy(tmp_path).figures["stopped"] == found.stopped
+    saved = load_training(tmp_path, begun)
+    assert int(saved.training.updates) == 4
+    again = run(TASK, CONFIG, plan(tmp_path), resume=True)
+    assert not again.diverged
+    assert int(again.training.updates) == 11
+
+
+def test_broken_networks_are_noticed_before_they_are_used(tmp_path: Path) -> None:
+    begun = ppo_course.beginning(TASK, CONFIG, jnp.int32(3), 1)
+
+    def advance(training: Training) -> tuple[Training, Report]:
+        after, report = stepped(3)(training)
+        return after, report._replace(value_loss=jnp.float32(1.0))
+
+    found = run(TASK, CONFIG, plan(tmp_path), advance=advance, begun=begun)
+    assert "networks are no longer finite" in (found.stopped or "")
+    assert load_policy(tmp_path).figures["updates"] >= 3
+
+
+def test_a_seed_in_trouble_does_not_stop_the_others(tmp_path: Path) -> None:
+    begun = ppo_course.beginning(TASK, CONFIG, jnp.int32(3), 2)
+    biases = begun.network.critic.biases
+    huge = biases[-1].at[1].set(3e38)
+    critic = replace(begun.network.critic, biases=(*biases[:-1], huge))
+    begun = begun._replace(network=replace(begun.network, critic=critic))
+    found = run(TASK, CONFIG, plan(tmp_path, seeds=2, saved_every=100), begun=begun, judge=lambda _: {"score": 1.0})
+    assert (found.diverged, found.stopped) == (False, None)
+    assert found.figures["troubles"][0] is None
+    assert "finite" in found.figures["troubles"][1]
+    assert found.figures["steps"] == 2 * 176
+    assert found.training.updates.tolist() == [11, 0]
+    assert found.history["reward"].shape == (2, 11)
+    assert np.isfinite(found.history["reward"][0]).all()
+    assert np.isnan(found.history["reward"][1, 1:]).all()
+    both = [load_policy(tmp_path / name) for name in ("seed-3", "seed-4")]
+    assert [one.figures["seed"] for one in both] == [3, 4]
+    assert "best_update" in both[0].figures
+    assert "best_update" not in both[1].figures
+
+
+def events(folder: Path) -> list[Event]:
+    """All events of a folder's files, in order; their checksums hold."""
+    found = []
+    for path in sorted(folder.iterdir()):
+        content = path.read_bytes()
+        while content:
+            length = int.from_bytes(content[:8], "little")
+            assert masked_crc32c(content[:8]) == int.from_bytes(content[8:12], "little")
+            event = Event()
+            event.ParseFromString(content[12 : 12 + length])
+            found.append(event)
+            content = content[16 + length :]
+    return found
+
+
+def test_tensorboard_shows_the_history(done: Run) -> None:
+    found = events(Path(done.policy.source["folder"]) / "tensorboard")
+    told = {(value.tag, event.step): value.simple_value for event in found for value in event.summary.value}
+    for name, tag in (("reward", "step/reward"), ("entropy", "policy/entropy"), ("gradient", "learning/gradient")):
+        rows = done.history[name][0].tolist()
+        assert [told[tag, 16 * (k + 1)] for k in range(11)] == rows
+    episodes = done.history["episodes"][0]
+    assert {step for tag, step in told if tag == "episode/return"} == {16 * (k + 1) for k in np.flatnonzero(episodes)}
+    assert all(np.isfinite(value) for value in told.values())
+
+
+def test_what_was_lost_is_hidden_on_tensorboard(tmp_path: Path) -> None:
+    asked = Asked(16 * 3)
+    run(TASK, CONFIG, plan(tmp_path), reporter=asked, stop=asked.stop)
+    run(TASK, CONFIG, plan(tmp_path), resume=True)
+    starts = [event.step for event in events(tmp_path / "tensorboard") if event.HasField("session_log")]
+    assert len(starts) == 1
+    assert starts[0] % 16 == 1
+
+
+def test_progress_is_told(tmp_path: Path) -> None:
+    asked = Asked()
+    run(TASK, CONFIG, plan(tmp_path), reporter=asked)
+    assert asked.told[-1][0] == 176
+    assert "steps/s" in asked.told[-1][1]
