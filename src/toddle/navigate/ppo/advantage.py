@@ -20,8 +20,8 @@ def advantages(
     after: Float[Array, "steps actors"],
     terminated: Bool[Array, "steps actors"],
     truncated: Bool[Array, "steps actors"],
-    gamma: float,
-    lambda_: float,
+    gamma: float | Float[Array, ""],
+    lambda_: float | Float[Array, ""],
 ) -> Float[Array, "steps actors"]:
     """How much better each action was than expected.
 

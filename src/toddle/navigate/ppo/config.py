@@ -6,7 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from toddle.failures import BadInput
+from toddle.failures import BadInput, unknown_name
+
+_KNOWN = {"schedule": ("constant", "linear"), "activation": ("tanh", "relu"), "bound": ("clip", "tanh", "mean")}
 
 
 @dataclass(frozen=True)
@@ -84,8 +86,15 @@ class PpoConfig:
         for name in ("epsilon", "learning_rate", "gradient_norm", "deviation", "least_reward"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise _bad(name, getattr(self, name), "give a number above 0")
-        if not all(map(math.isfinite, (self.c1, self.c2, self.kl_limit))):
-            raise _bad("c1, c2, kl_limit", (self.c1, self.c2, self.kl_limit), "give finite numbers")
+        if not all(map(math.isfinite, (self.c1, self.c2))):
+            raise _bad("c1, c2", (self.c1, self.c2), "give finite numbers")
+        if not 0 <= self.kl_limit < math.inf:
+            raise _bad("kl_limit", self.kl_limit, "give 0, for none, or a number above it")
+        if self.normalise_advantages and self.minibatch < 2:
+            raise _bad("minibatch", self.minibatch, "one advantage alone, normalised, is 0: give 2 or more")
+        for name, known in _KNOWN.items():
+            if getattr(self, name) not in known:
+                raise unknown_name(name, str(getattr(self, name)), known, where="PPO")
         if not self.hidden or min(self.hidden) < 1 or self.memory < 0:
             raise _bad("hidden", self.hidden, "give units of at least one layer")
         if self.batch % self.minibatch:

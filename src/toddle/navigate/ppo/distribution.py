@@ -85,9 +85,14 @@ def bounded(action: Array, bound: Bound) -> Array:
 
 
 def entropy_of(given: Distribution, action: Array, bound: Bound) -> Float[Array, "*batch"]:
-    """Entropy of what the task gets: where it is squashed, by the one sample that there is, as there is no formula."""
+    """Entropy of what the task gets: where it is squashed, by the one sample that there is, as there is no formula.
+
+    The sample moves with the distribution, so that the gradient too is that of the squashed entropy.
+    """
     if not (isinstance(given, Gaussian) and bound == "tanh"):
         return given.entropy()
+    deviation = jnp.exp(given.log_deviation)
+    drawn = given.mean + deviation * jax.lax.stop_gradient((action - given.mean) / deviation)
     # log(1 - tanh(u)^2), in a form that stays finite
-    shrunk = 2 * (math.log(2) - action - jax.nn.softplus(-2 * action))
+    shrunk = 2 * (math.log(2) - drawn - jax.nn.softplus(-2 * drawn))
     return given.entropy() + shrunk.sum(axis=-1)

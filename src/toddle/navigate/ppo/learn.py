@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import optax
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
+from toddle.navigate.ppo.adam import Adam, at_rest, moved, shortened
 from toddle.navigate.ppo.advantage import advantages
 from toddle.navigate.ppo.collect import Rollout, Row
 from toddle.navigate.ppo.config import PpoConfig
 from toddle.navigate.ppo.network import ActorCritic
 from toddle.navigate.ppo.objective import Losses, Minibatch, objective
-
-_ADAM = optax.scale_by_adam(eps=1e-5)
 
 
 class Learned(NamedTuple):
@@ -30,21 +28,21 @@ class Learned(NamedTuple):
     """
 
     network: ActorCritic
-    optimiser: Any
+    optimiser: Adam
     losses: Losses
     explained: Float[Array, ""]
     gradient: Float[Array, ""]
 
 
-def fresh_optimiser(network: ActorCritic) -> Any:
-    """Adam's state before the first step."""
-    return _ADAM.init(cast(Any, network))
+def fresh_optimiser(network: ActorCritic) -> Adam:
+    """Before the first step."""
+    return at_rest(network)
 
 
 def learn(
     config: PpoConfig,
     network: ActorCritic,
-    optimiser: Any,
+    optimiser: Adam,
     rollout: Rollout,
     rewards: Float[Array, "steps actors"],
     rate: Float[Array, ""],
@@ -76,12 +74,10 @@ def learn(
         network, optimiser, stopped = carry
         batch = jax.tree.map(lambda part: part[chosen], everything)
         gradient, losses = jax.grad(objective, has_aux=True)(network, batch, config, c2)
-        norm = optax.global_norm(gradient)
-        shortened = jax.tree.map(lambda g: g * jnp.minimum(1.0, config.gradient_norm / (norm + 1e-6)), gradient)
-        change, after = _ADAM.update(shortened, optimiser)
-        moved = jax.tree.map(lambda old, by: old - rate * by, network, change)
+        gradient, norm = shortened(gradient, config.gradient_norm)
+        now = moved(network, optimiser, gradient, rate)
         stopped = stopped | (losses.kl > config.kl_limit if config.kl_limit else jnp.zeros((), bool))
-        return (*_unless(stopped, (moved, after), (network, optimiser)), stopped), (losses, norm)
+        return (*_unless(stopped, now, (network, optimiser)), stopped), (losses, norm)
 
     def epoch(carry: tuple, key: PRNGKeyArray) -> tuple:
         order = jax.random.permutation(key, count).reshape(-1, each)

@@ -15,6 +15,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
+from toddle.navigate.ppo.adam import Adam
 from toddle.navigate.ppo.collect import Actors, Rollout, Row, begin, collect
 from toddle.navigate.ppo.config import PpoConfig
 from toddle.navigate.ppo.learn import Learned, fresh_optimiser, learn
@@ -37,7 +38,7 @@ class Training(NamedTuple):
     """
 
     network: ActorCritic
-    optimiser: Any
+    optimiser: Adam
     observations: Moments
     returns: Moments
     actors: Actors
@@ -109,7 +110,7 @@ def update(config: PpoConfig, training: Training, rollout: Rollout) -> tuple[Tra
     returns = training.returns.seen(rows.discounted.reshape(-1, 1))
     rewards = rows.reward
     if config.normalise_rewards:
-        rewards = rewards / jnp.sqrt(returns.variance + 1e-8)
+        rewards = rewards / jnp.sqrt(returns.variance[0] + 1e-8)
     rate, c2 = learning_rate(config, training.updates), _entropy_weight(config, rows.reward)
     found = learn(config, training.network, training.optimiser, rollout, rewards, rate, c2, shuffling)
     after = Training(found.network, found.optimiser, observations, returns, training.actors, key, training.updates + 1)
