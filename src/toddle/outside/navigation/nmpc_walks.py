@@ -104,7 +104,8 @@ def _native(problem: Nmpc, hold: int, threads: int) -> Callable[..., Walker]:
     def step(state: Walker, asked: Any, circles: Any) -> Walker:
         given = jax.tree.map(np.asarray, (state, asked, circles))
         lead = given[1].ndim - 1
-        (walk, allowed), wanted, around = jax.tree.map(lambda part: part.reshape(-1, *part.shape[lead:]), given)
+        count = given[1][..., 0].size
+        (walk, allowed), wanted, around = jax.tree.map(lambda part: part.reshape(count, *part.shape[lead:]), given)
         found = step_gated(problem, Gated(walk, allowed), wanted, around, hold=hold, shares=shares)
         return jax.tree.map(lambda part, old: part.reshape(old.shape), Walker(*found), given[0])
 
