@@ -19,6 +19,28 @@ POINT = PpoConfig(
 )
 """The document's point (Huber 2019, section 4.3.1); networks, epsilon, c1, M and K are the document's."""
 
+GOAL = PpoConfig(
+    steps=400_000,
+    actors=64,
+    horizon=32,
+    minibatch=512,
+    epochs=8,
+    c2=0.0,
+    learning_rate=1e-3,
+)
+"""The walker that goes to a goal (Huber 2019, section 4.3.2); 64-64 tanh, as there."""
+
+OBSTACLES = PpoConfig(
+    steps=4_000_000,
+    actors=128,
+    horizon=64,
+    minibatch=1024,
+    epochs=4,
+    c2=0.0,
+    learning_rate=1e-3,
+)
+"""The same around obstacles and among people, with a range scan."""
+
 PRESETS = {
     "point": POINT,
     "goal": GOAL,
