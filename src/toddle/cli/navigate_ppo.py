@@ -219,13 +219,14 @@ def _learned(asked: Ppo, job: Job) -> tuple[Run, Callable[[Policy, int], dict[st
         if "env" in job.source:
             gym = GymTraining(job.name, job.config, anew_every=saved)
             try:
-                run_ = run(
-                    gym.copies.spaces, job.config, plan, advance=gym.advance, begun=gym.init(jax.random.key(asked.seed)),
-                    resume=job.resumed, reporter=reporter, stop=stop,
+                begun = gym.init(jax.random.key(asked.seed))
+                found = run(
+                    gym.copies.spaces, job.config, plan, advance=gym.advance, begun=begun, resume=job.resumed,
+                    reporter=reporter, stop=stop,
                 )  # fmt: skip
             finally:
                 gym.close()
-            return run_, lambda policy, seed: judge_gym(job.name, policy, seed, asked.episodes)
+            return found, lambda policy, seed: judge_gym(job.name, policy, seed, asked.episodes)
         task = make_task(source_from(job.source))
 
         def tried(policy: Policy, seed: int) -> dict[str, Any]:
