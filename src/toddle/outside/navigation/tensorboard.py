@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -24,7 +25,6 @@ TAGS = {
     "rate": "learning/rate",
     "gradient": "learning/gradient",
 }
-_OF_EPISODES = ("return_", "length")
 
 
 class Board:
@@ -56,12 +56,16 @@ class Board:
             steps_per_second: at which they came.
         """
         for row, steps in enumerate(rows["steps"].tolist()):
-            episodes = int(rows["episodes"][row])
-            for name, tag in TAGS.items():
-                if episodes or name not in _OF_EPISODES:
-                    self._writer.add_scalar(tag, float(rows[name][row]), steps)
-            if episodes:
-                for outcome in tuple(Outcome)[1:]:
-                    share = float(rows["outcomes"][row, outcome]) / episodes
-                    self._writer.add_scalar(f"episode/{outcome.name.lower()}", share, steps)
-            self._writer.add_scalar("speed/steps_per_second", steps_per_second, steps)
+            if steps:  # else nothing was made
+                for tag, value in _scalars(rows, row).items():
+                    self._writer.add_scalar(tag, value, steps)
+                self._writer.add_scalar("speed/steps_per_second", steps_per_second, steps)
+
+
+def _scalars(rows: Mapping[str, np.ndarray], row: int) -> dict[str, float]:
+    """Of one update; what isn't finite can't be drawn."""
+    found = {tag: float(rows[name][row]) for name, tag in TAGS.items()}
+    if episodes := int(rows["episodes"][row]):
+        counts = rows["outcomes"][row].tolist()
+        found |= {f"episode/{one.name.lower()}": counts[one] / episodes for one in tuple(Outcome)[1:]}
+    return {tag: value for tag, value in found.items() if math.isfinite(value)}
