@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 NAMES = (
     "huber-patterns",
+    "huber-ppo-toy",
+    "huber-ppo-walker",
     "huber-zmp",
     "mahboob-hyperparameters",
     "mahboob-nicu",
