@@ -51,7 +51,7 @@ class Walker(NamedTuple):
 
 
 def nmpc_walks(robot: Humanoid | Gait, *, solver: Solver = "auto", hold: int = 4, threads: int | None = None) -> Walks:
-    """The walker as tasks take it.
+    """The walker as tasks take it. It starts where its gait says, by default at the origin.
 
     Args:
         robot: whose gait it is.

@@ -112,7 +112,7 @@ def nearest(matrix, low, high, marks, slack, u):
     active, side = np.empty(most, np.int64), np.empty(most)
     bound, at, towards = np.empty(most), np.empty(most), np.empty(most)
     softness = np.where(marks == 0, 0.0, slack)
-    count = 0
+    count, singular = 0, False
     for _ in range(CHANGES):
         if row >= 0:
             if count == most or lengths[row] < 1e-12:

@@ -237,7 +237,7 @@ def shifted(numbers, apart, at, plan, w, velocity):
     plan.jerks[w], plan.zmp[w], plan.feet[w], plan.displacement[w] = jerks, zmp, steps, moved
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def planned(tables, numbers, stride, at, plan, w, velocity, circles):
     """`nmpc.plan`: the last plan of walker w becomes the next one; ``velocity`` is 0 for one that halts."""
     feet = plan.feet.shape[1]
@@ -282,7 +282,7 @@ def remember(at, plan, w, finite):
         plan.known[w] = True
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def solved(tables, numbers, at, plan, w, velocity, sign, place, drawn, yaws, around, pinned):
     """Linearised at the plan, which stays as it is where there is no better one; the status."""
     com = at.com[w].copy()
