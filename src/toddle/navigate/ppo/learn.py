@@ -14,6 +14,7 @@ from toddle.navigate.ppo.collect import Rollout, Row
 from toddle.navigate.ppo.config import PpoConfig
 from toddle.navigate.ppo.network import ActorCritic
 from toddle.navigate.ppo.objective import Losses, Minibatch, objective
+from toddle.navigate.ppo.shuffle import shuffled
 
 
 class Learned(NamedTuple):
@@ -80,7 +81,7 @@ def learn(
         return (*_unless(stopped, now, (network, optimiser)), stopped), (losses, norm)
 
     def epoch(carry: tuple, key: PRNGKeyArray) -> tuple:
-        order = jax.random.permutation(key, count).reshape(-1, each)
+        order = shuffled(key, count).reshape(-1, each)
         return jax.lax.scan(step, carry, order)
 
     begun = (network, optimiser, jnp.zeros((), bool))
