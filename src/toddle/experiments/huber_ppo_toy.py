@@ -271,9 +271,9 @@ def run(task: Task) -> Outcome:
     seeds = tuple(range(task.seed, task.seed + parameters.seeds))
     fresh = tuple(range(task.seed + 1000, task.seed + 1000 + parameters.fresh))
     asked = {
-        "document": (parameters.document, seeds, (0.0, 0.3)),
-        "program": (parameters.program, seeds, (0.3, 0.4)),
-        "ours": (parameters.ours, seeds, (0.4, 0.6)),
+        "ours": (parameters.ours, seeds, (0.0, 0.2)),
+        "document": (parameters.document, seeds, (0.2, 0.5)),
+        "program": (parameters.program, seeds, (0.5, 0.6)),
         "fresh": (parameters.ours, fresh, (0.6, 0.95)),
         "alone": (parameters.ours, seeds[:1], (0.95, 1.0)),
     }

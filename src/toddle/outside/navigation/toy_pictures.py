@@ -33,8 +33,9 @@ def games(
         widest: how far to each side is drawn.
     """
     figure = new_figure(5.0 * len(panels) + 0.4, 5.4)
+    grid = figure.add_gridspec(1, len(panels))
     for k, (name, played) in enumerate(panels.items()):
-        axes = plain_axes(figure, (1, len(panels), k + 1))
+        axes = plain_axes(figure, grid[k])
         for game in played:
             axes.plot(game[:, 0], game[:, 1], color=OURS, lw=0.8, alpha=0.7)
             axes.plot(*game[-1, :2], ".", color=INK, ms=4)
