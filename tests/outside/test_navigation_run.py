@@ -22,6 +22,7 @@ from toddle.navigate.ppo.config import PpoConfig
 from toddle.navigate.ppo.training import Report, Training, train
 from toddle.navigate.tasks.point import PointTask
 from toddle.outside.navigation import ppo_course
+from toddle.outside.navigation.learning_pictures import epochs, learning_curve
 from toddle.outside.navigation.policy_files import load_policy
 from toddle.outside.navigation.ppo_run import Plan, Run, run
 from toddle.outside.navigation.training_files import load_training
@@ -98,7 +99,8 @@ def test_a_run_that_was_stopped_goes_on_bit_for_bit(tmp_path: Path, done: Run, a
     assert first.stopped == "it was asked to stop"
     assert not first.diverged
     assert 0 < first.figures["updates"] < 11
-    second = run(TASK, CONFIG, plan(tmp_path), resume=True)
+    second = run(TASK, CONFIG, plan(tmp_path, seed=8), resume=True)  # it knows its own seed
+    assert second.figures["seed"] == 3
     assert bits(second.training) == bits(done.training)
     assert {k: v.tobytes() for k, v in second.history.items()} == {k: v.tobytes() for k, v in done.history.items()}
     assert second.figures["steps"] == 176
@@ -228,6 +230,16 @@ def test_a_seed_in_trouble_does_not_stop_the_others(tmp_path: Path) -> None:
     assert "best_update" not in both[1].figures
 
 
+def test_several_seeds_go_on_bit_for_bit(tmp_path: Path) -> None:
+    both = run(TASK, CONFIG, plan(tmp_path / "whole", seeds=2))
+    asked = Asked(16 * 5)
+    run(TASK, CONFIG, plan(tmp_path / "cut", seeds=2), reporter=asked, stop=asked.stop)
+    again = run(TASK, CONFIG, plan(tmp_path / "cut"), resume=True)
+    assert bits(again.training) == bits(both.training)
+    assert len(again.policies) == 2
+    assert bits(again.policies[0].network) != bits(again.policies[1].network)
+
+
 def events(folder: Path) -> list[Any]:
     """All events of a folder's files, in order; their checksums hold."""
     found = []
@@ -268,3 +280,32 @@ def test_progress_is_told(tmp_path: Path) -> None:
     run(TASK, CONFIG, plan(tmp_path), reporter=asked)
     assert asked.told[-1][0] == 176
     assert "steps/s" in asked.told[-1][1]
+
+
+def test_epochs_of_another_length_than_updates() -> None:
+    """Updates of 4 steps of reward 1, 2, 3 each; epochs of 6 hold 4 + 2 x 2 and 2 x 2 + 4 x 3."""
+    history = {
+        "steps": np.array([[4, 8, 12], [4, 0, 0]]),
+        "reward": np.array([[1.0, 2.0, 3.0], [1.0, np.nan, np.nan]]),
+        "deviation": np.array([[1.0, 0.5, 0.1], [1.0, np.nan, np.nan]]),
+    }
+    found = epochs(history, 6)
+    np.testing.assert_allclose(found.reward, [[8, 16], [np.nan, np.nan]])
+    assert not found.discrete
+    np.testing.assert_allclose(found.explored, [[0.75, 0.1], [np.nan, np.nan]])
+
+
+@pytest.mark.parametrize(("seeds", "epoch"), [(1, None), (4, 10_000)])
+@pytest.mark.parametrize("discrete", [True, False])
+def test_curves_are_drawn(tmp_path: Path, seeds: int, epoch: int | None, discrete: bool) -> None:
+    rng, updates = np.random.default_rng(0), 122
+    history = {
+        "steps": np.tile(4096 * np.arange(1, updates + 1), (seeds, 1)),
+        "reward": 0.3 * (1 - np.exp(-np.arange(updates) / 30)) + 0.01 * rng.normal(size=(seeds, updates)),
+        "deviation": np.zeros((seeds, updates)) if discrete else np.linspace(0.5, 1, updates) * np.ones((seeds, 1)),
+        "entropy": np.linspace(2, 0.1, updates) + 0.05 * rng.normal(size=(seeds, updates)),
+    }
+    history["steps"][-1, 90:] = 0
+    history["reward"][-1, 90:] = np.nan
+    learning_curve(tmp_path / "curve.png", history, title="the point", epoch=epoch, published=30.0 if epoch else None)
+    assert (tmp_path / "curve.png").read_bytes().startswith(b"\x89PNG")

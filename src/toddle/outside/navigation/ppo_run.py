@@ -26,7 +26,7 @@ from toddle.outside.navigation import ppo_course
 from toddle.outside.navigation.policy_files import save_policy
 from toddle.outside.navigation.ppo_course import Advance, Course, Drive, Judge, Mark
 from toddle.outside.navigation.tensorboard import Board
-from toddle.outside.navigation.training_files import History, load_training, save_training
+from toddle.outside.navigation.training_files import History, load_training, read_figures, save_training
 from toddle.outside.terminal import Stop
 
 _PACE = 0.5  # between two calls [s]
@@ -144,7 +144,7 @@ def run(
         judge: tries policies out; without one the last is kept.
         advance: makes an update, for tasks that are not stepped in JAX; it begins with ``begun``.
         begun: the run before its first update, see ``advance``.
-        resume: take up the run that is in the folder.
+        resume: take up the run that is in the folder, with its own seeds.
         reporter: is told how far it has come, in steps of each seed.
         stop: is looked at twice a second.
 
@@ -153,6 +153,9 @@ def run(
     """
     if advance is not None and (begun is None or plan.seeds > 1):
         raise BadInput("it is learned by one seed at a time", where=plan.name, remedy="leave --seeds out")
+    if resume:
+        figures = read_figures(plan.folder)
+        plan = replace(plan, seed=int(figures["seed"]), seeds=int(figures["seeds"]))
     make_folder(plan.folder)
     watch = _Watch(task, config, plan, judge, reporter, stop)
     started = time.perf_counter()
@@ -266,6 +269,8 @@ def _news(course: Course, speed: float) -> str:
 def _save(watch: _Watch, course: Course, compiling: float) -> None:
     """A checkpoint, and the policies as they would be if it ended here."""
     facts = {
+        "seed": watch.plan.seed,
+        "seeds": watch.plan.seeds,
         "updates": course.done,
         "troubles": list(course.troubles),
         "marks": [None if mark is None else mark._asdict() for mark in course.marks],

@@ -109,6 +109,15 @@ def read_training(folder: Path) -> tuple[PpoConfig, dict[str, Any]]:
     return found[0], dict(found[1]["source"])
 
 
+def read_figures(folder: Path) -> dict[str, Any]:
+    """How far a saved run has come.
+
+    Raises:
+        BadInput: there is none, or it is truncated, altered, or not a run.
+    """
+    return dict(_newest(folder)[1]["figures"])
+
+
 def load_training(folder: Path, template: Training) -> Saved:
     """Take up a saved run.
 
