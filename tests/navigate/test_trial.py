@@ -16,7 +16,7 @@ from toddle.navigate.task import Outcome
 from toddle.navigate.tasks.point import PRIZE, PointTask
 from toddle.navigate.trial import episodes, tally
 
-TASK = PointTask()
+TASK = PointTask(near=0.57)  # no place on the way is as near as that to the last bit
 CONFIG = PpoConfig(hidden=(4,), activation="relu", bound="clip", normalise_observations=False)
 
 
@@ -36,7 +36,7 @@ def walker(way: float) -> Policy:
 def known(goal: tuple[int, int]) -> tuple[int, float]:
     """Steps and sum of rewards of a walk to a goal."""
     place, steps = np.zeros(2), 0
-    while steps == 0 or np.hypot(*(place - goal)) >= 0.6:
+    while steps == 0 or np.hypot(*(place - goal)) >= 0.57:
         place += 0.1 * np.clip(10 * (np.array(goal) - place), -1, 1)
         steps += 1
     return steps, np.hypot(*goal) - np.hypot(*(place - goal)) + PRIZE
@@ -48,7 +48,7 @@ def test_first_episodes_are_those_of_the_walk():
     walks = [known((x, y)) for x in range(-5, 6) for y in range(-5, 6)]
     for length, total in zip(found.length.tolist(), found.total.tolist(), strict=True):
         assert any(length == steps and total == pytest.approx(gained, abs=1e-3) for steps, gained in walks)
-    assert len(set(found.length.tolist())) > 10
+    assert len(set(found.length.tolist())) > 5
 
 
 def test_episodes_that_did_not_end_say_so():

@@ -64,7 +64,7 @@ def episodes_from(
     first = jnp.argmax(ended, axis=0)
     done = ended.any(axis=0)
     length = jnp.where(done, first + 1, steps).astype(jnp.int32)
-    inside = jnp.arange(steps)[:, None] < length
+    inside = jnp.arange(steps)[:, None] < length[None]
     last = jnp.take_along_axis(outcome, first[None], axis=0)[0]
     return Episode(
         jnp.where(done, last, jnp.int32(Outcome.GOES_ON)), length, jnp.where(inside, reward, 0.0).sum(axis=0)
