@@ -63,6 +63,7 @@ class Rules:
         far: farther away from the goal it is lost [m].
         told: whether the walker's own avoidance of obstacles is told of circles and people.
         settle: whether it must also come to stand at the goal, without falling or touching anything.
+        body: radius of the robot, for the shortest way [m].
     """
 
     seconds: float = 60.0
@@ -70,6 +71,7 @@ class Rules:
     far: float = 4.0
     told: bool = True
     settle: bool = True
+    body: float = 0.2
 
     def __post_init__(self) -> None:
         """Refuses what is no time or distance.
@@ -77,7 +79,7 @@ class Rules:
         Raises:
             BadInput: a number that is not above 0.
         """
-        for name in ("seconds", "near", "far"):
+        for name in ("seconds", "near", "far", "body"):
             if not getattr(self, name) > 0:
                 raise BadInput(
                     f"{getattr(self, name)} is no use", where=f"rules, {name}", remedy="give a number above 0"
@@ -191,4 +193,4 @@ def _mean(numbers: Sequence[float]) -> float:
 
 def rules_of(task: WalkerTask, *, settle: bool = True) -> Rules:
     """The rules that a task was learned by."""
-    return Rules(task.seconds, task.near, task.far, task.told, settle)
+    return Rules(task.seconds, task.near, task.far, task.told, settle, task.body)

@@ -156,14 +156,14 @@ class _Judge:
         """How it ended; a driver that gave up before the goal is late."""
         seconds = min(self.arrived, self.ended)
         path = np.array(self.path).reshape(-1, 4)
-        gait = self.there.walker.gait
+        sway = 2 * self.there.walker.gait.step_time
         return Finish(
             self.outcome if self.outcome != Outcome.GOES_ON else Outcome.LATE,
             seconds,
             path,
             tuple(self.feet),
-            path_length(path[path[:, 0] <= seconds + TICK / 2], 2 * gait.step_time),
-            shortest_way(self.course, self.rules.near, body=gait.foot_distance),
+            path_length(path[path[:, 0] <= seconds + TICK / 2], sway),
+            shortest_way(self.course, self.rules.near, self.rules.body),
             self.clearance,
             float(np.mean(self.errors)) if self.errors else math.nan,
         )
