@@ -1,0 +1,1 @@
+"""Measurements of what learns to navigate."""
