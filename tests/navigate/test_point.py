@@ -36,13 +36,13 @@ def test_goals_are_whole_numbers_of_the_whole_square():
 
 
 def test_rewards_of_an_episode_are_the_way_gained_and_the_prize():
-    task, state, total, steps = PointTask(), at((3.0, 4.0)), 0.0, 0
-    outcome = Outcome.GOES_ON
-    while outcome == Outcome.GOES_ON:
+    task, (state, step) = PointTask(), go(PointTask(), at((3.0, 4.0)), 0.6, 0.8)
+    total, steps = float(step.reward), 1
+    while int(step.outcome) == Outcome.GOES_ON:
         state, step = go(task, state, 0.6, 0.8)
-        total, steps, outcome = total + float(step.reward), steps + 1, int(step.outcome)
+        total, steps = total + float(step.reward), steps + 1
     # strides of 0.1 along the way of 5: nearer than 0.6 after 45
-    assert (steps, outcome) == (45, Outcome.WON)
+    assert (steps, int(step.outcome)) == (45, Outcome.WON)
     assert bool(step.terminated)
     assert not bool(step.truncated)
     assert total == pytest.approx(4.5 + PRIZE, abs=1e-4)

@@ -35,8 +35,8 @@ def through_numpy(training: Training) -> Training:
     """As from a file."""
 
     def back(part: jax.Array) -> jax.Array:
-        kept = plain(part)
-        return jax.random.wrap_key_data(kept) if jnp.issubdtype(part.dtype, jax.dtypes.prng_key) else jnp.asarray(kept)
+        kept = jnp.asarray(plain(part))
+        return jax.random.wrap_key_data(kept) if jnp.issubdtype(part.dtype, jax.dtypes.prng_key) else kept
 
     return jax.tree.map(back, training)
 
