@@ -18,7 +18,7 @@ from jaxtyping import Array
 from toddle.failures import BadInput
 from toddle.navigate.policy import Policy, policy_of
 from toddle.navigate.ppo.config import PpoConfig
-from toddle.navigate.ppo.training import Training, init, train
+from toddle.navigate.ppo.training import Training, init
 from toddle.navigate.task import Continuous, Discrete
 from toddle.navigate.tasks.point import PointTask
 from toddle.outside import files
@@ -32,10 +32,9 @@ CONFIG = PpoConfig(
 
 
 @functools.cache
-def trained(updates: int) -> tuple[Training, Any]:
-    """A run with a memory after so many updates, two by two."""
-    before = begun(jax.random.key(5)) if updates == 2 else trained(updates - 2)[0]
-    return train(TASK, CONFIG, before, 2)
+def trained(updates: int) -> Training:
+    """A run with a memory, as it might be after so many updates."""
+    return begun(jax.random.key(updates))._replace(updates=jnp.int32(updates))
 
 
 begun = jax.jit(functools.partial(init, TASK, CONFIG))
@@ -44,7 +43,7 @@ begun = jax.jit(functools.partial(init, TASK, CONFIG))
 @functools.cache
 def policy() -> Policy:
     """A policy that has learned a little."""
-    return policy_of(trained(2)[0], CONFIG, TASK.actions, {"env": "point"}, {"return_mean": -0.1})
+    return policy_of(trained(2), CONFIG, TASK.actions, {"env": "point"}, {"return_mean": -0.1})
 
 
 def shapes() -> Training:
@@ -92,7 +91,9 @@ def _untrained(config: PpoConfig, task: _Spaces) -> Policy:
     from toddle.navigate.ppo.moments import unseen
     from toddle.navigate.ppo.network import actor_critic
 
-    network = jax.jit(actor_critic, static_argnums=(0, 1, 2))(config, *task, jax.random.key(1))
+    network = jax.eval_shape(lambda: actor_critic(config, task.observations, task.actions, jax.random.key(1)))
+    rng = np.random.default_rng(1)
+    network = jax.tree.map(lambda part: jnp.asarray(rng.normal(size=part.shape), jnp.float32), network)
     return Policy(network, unseen(task.observations), config, task.observations, task.actions)
 
 
@@ -174,13 +175,13 @@ def test_a_broken_policy_is_not_written(tmp_path: Path) -> None:
 
 def saved(folder: Path, updates: int) -> Training:
     """A run of so many updates, saved."""
-    training, report = trained(updates)
-    history = {"reward": np.asarray(report.reward), "steps": np.asarray(report.steps)}  # of the last two
+    training, steps = trained(updates), CONFIG.batch * np.arange(1, 3)
+    history = {"reward": np.array([0.5, np.nan], np.float32), "steps": steps}
     save_training(folder, CONFIG, training, history, {"env": "point"}, figures={"seed": 5})
     return training
 
 
-def test_a_run_comes_back_and_goes_on_bit_for_bit(tmp_path: Path) -> None:
+def test_a_run_comes_back_bit_for_bit(tmp_path: Path) -> None:
     training = saved(tmp_path, 2)
     assert read_training(tmp_path) == (CONFIG, {"env": "point"})
     found = load_training(tmp_path, shapes())
@@ -193,11 +194,11 @@ def test_a_run_comes_back_and_goes_on_bit_for_bit(tmp_path: Path) -> None:
     )
     assert found.history["steps"].tolist() == [CONFIG.batch, 2 * CONFIG.batch]
     assert found.best is None
-    assert bits(train(TASK, CONFIG, found.training, 2)[0]) == bits(trained(4)[0])
+    assert np.isnan(found.history["reward"][1])
 
 
 def test_what_did_best_comes_back_too(tmp_path: Path) -> None:
-    training, early = trained(2)[0], trained(4)[0]
+    training, early = trained(2), trained(4)
     save_training(tmp_path, CONFIG, training, {}, {}, best=(early.network, early.observations))
     assert bits(load_training(tmp_path, shapes()).best) == bits((early.network, early.observations))
 
@@ -215,7 +216,7 @@ def test_a_task_may_hold_any_arrays(tmp_path: Path) -> None:
         np.linspace(0, 1, 5), jax.random.split(jax.random.key(3), 4),
         {"a": (jnp.arange(3), jnp.array([True, False])), "b": [np.zeros((0, 2), np.int64), jnp.uint8(7)]},
     )  # fmt: skip
-    training = trained(2)[0]
+    training = trained(2)
     training = training._replace(actors=training.actors._replace(state=state))
     save_training(tmp_path, CONFIG, training, {}, {})
     found = load_training(tmp_path, training).training
@@ -258,10 +259,10 @@ def test_a_crash_in_between_loses_nothing(tmp_path: Path, monkeypatch: pytest.Mo
         saved(tmp_path, 4)
     monkeypatch.setattr(os, "replace", put)
     found = load_training(tmp_path, shapes())
-    assert bits(found.training) == bits(before if writes < 3 else trained(4)[0])
+    assert bits(found.training) == bits(before if writes < 3 else trained(4))
     assert found.passed_over is None
     saved(tmp_path, 4)
-    assert bits(load_training(tmp_path, shapes()).training) == bits(trained(4)[0])
+    assert bits(load_training(tmp_path, shapes()).training) == bits(trained(4))
     assert len(list((tmp_path / "checkpoints").iterdir())) == 2
 
 

