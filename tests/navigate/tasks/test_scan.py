@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ def test_every_ray_ends_where_samples_along_it_first_lie_in_a_circle(seed: int, 
     place = draw.uniform(-1, 1, 3) * [1, 1, math.pi]
     circles = np.column_stack([draw.uniform(-2, 2, (6, 2)), draw.uniform(0.05, 0.6, 6)])
     circles[0, 2] = -1.0
-    seen = np.asarray(scan(jnp.asarray(place, jnp.float32), jnp.asarray(circles, jnp.float32), rays, REACH))
+    seen = np.asarray(scan(jnp.asarray(place, jnp.float32), jnp.asarray(circles, jnp.float32), rays, REACH, beams=1))
     off = np.abs(seen - sampled(place, circles, rays)) * REACH
     grazing = np.zeros(rays, bool)  # a ray that only touches a rim may be seen or not
     for ray in range(rays):
@@ -56,8 +57,23 @@ def test_every_ray_ends_where_samples_along_it_first_lie_in_a_circle(seed: int, 
     ],
 )
 def test_one_circle(circle: tuple[float, float, float], ahead: float, left: float, behind: float) -> None:
-    seen = scan(jnp.zeros(3), jnp.array([circle]), 4, REACH)
+    seen = scan(jnp.zeros(3), jnp.array([circle]), 4, REACH, beams=1)
     np.testing.assert_allclose(REACH * np.asarray(seen)[:3], [ahead, left, behind], atol=1e-6)
+
+
+def test_a_ray_is_the_nearest_of_the_beams_of_its_sector() -> None:
+    place, circles = jnp.array([0.3, -0.2, 1.0]), jnp.array([[1.0, 0.5, 0.1], [-0.5, 1.0, 0.3], [0.0, -1.5, 0.2]])
+    fine = np.asarray(scan(place, circles, 24, REACH, beams=1))
+    sectors = np.roll(fine, 1).reshape(8, 3)  # the first beam of the first sector lies to the right of straight ahead
+    np.testing.assert_allclose(scan(place, circles, 8, REACH, beams=3), sectors.min(axis=1), atol=1e-5)
+    assert (sectors.min(axis=1) < sectors[:, 1]).any()
+
+
+def test_no_circle_slips_between_the_rays_of_the_walkers_task() -> None:
+    turns = jnp.linspace(0.0, 2 * math.pi, 500)
+    thinnest = jnp.array([[1.1, 0.0, 0.1]])
+    seen = jax.vmap(lambda turn: scan(jnp.array([0.0, 0.0, 1.0]) * turn, thinnest, 24, REACH))(turns)
+    assert (seen.min(axis=1) < 1.0).all()
 
 
 def test_without_circles_nothing_is_seen() -> None:

@@ -1,6 +1,6 @@
 """People who walk: discs that go straight from one random way point to the next inside a square room.
 
-They do not aim at the robot and do not evade it: one who comes along has to be let by.
+They do not aim at the robot and do not evade it, nor circles: one who comes along has to be let by.
 """
 
 from __future__ import annotations
