@@ -38,9 +38,11 @@ def test_same_as_the_sum_written_out(seed: int, ends: float, gamma: float, lambd
     drawn = np.random.default_rng(seed)
     numbers = drawn.normal(size=(3, STEPS, ACTORS)).astype(np.float32) * 10
     cuts = drawn.random((2, STEPS, ACTORS)) < ends
-    found = estimated(*map(jnp.asarray, (*numbers, *cuts)), gamma=jnp.float32(gamma), lambda_=jnp.float32(lambda_))
+    rewards, values, after = map(jnp.asarray, numbers)
+    terminated, truncated = map(jnp.asarray, cuts)
+    found = estimated(rewards, values, after, terminated, truncated, jnp.float32(gamma), jnp.float32(lambda_))
     for actor in range(ACTORS):
-        known = one_by_one(*numbers[:, :, actor].astype(float), *cuts[:, :, actor], gamma, lambda_)
+        known = one_by_one(*numbers[:, :, actor].astype(float), *cuts[:, :, actor], gamma=gamma, lambda_=lambda_)
         np.testing.assert_allclose(found[:, actor], known, rtol=1e-4, atol=1e-4)
 
 
