@@ -341,7 +341,7 @@ def _figures(found: Learned, test: Tested) -> dict[str, Any]:
     runs = [
         {
             "env": "point", "seed": seed, "steps": steps,
-            "success_rate": float(games.won.mean()), "wins": float(test.wins[k].mean()),
+            "success_rate": float(np.asarray(games.won).mean()), "wins": float(test.wins[k].mean()),
             "losses": float(test.losses[k].mean()), "least_wins": int(test.wins[k].min()),
             "return_mean": float(test.total[k].sum() / max(1, test.wins[k].sum() + test.losses[k].sum())),
             "exact_wins": float(games.rate),
