@@ -79,7 +79,9 @@ class Parameters:
 
 
 FULL = Parameters(seeds=10, fresh=30, document=DOCUMENT, program=PROGRAM, ours=preset("point"))
-QUICK = replace(FULL, seeds=3, fresh=0, document=replace(DOCUMENT, steps=100_000))
+QUICK = replace(
+    FULL, seeds=3, fresh=0, document=replace(DOCUMENT, steps=50_000), program=replace(PROGRAM, steps=150_000)
+)
 
 
 class Games(NamedTuple):
