@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache, partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -138,7 +139,8 @@ def test_a_walker_that_is_lost_has_fallen():
 
 
 def test_what_cannot_be_is_refused(unchecked):
-    for given in ({"solver": "nativ"}, {"hold": 0}, {"threads": 0}):
+    refused: tuple[dict[str, Any], ...] = ({"solver": "nativ"}, {"hold": 0}, {"threads": 0})
+    for given in refused:
         with pytest.raises(BadInput, match=next(iter(given))):
             nmpc_walks(ICUB, **given)
     with pytest.raises(BadInput, match=r"6\.5 samples"):

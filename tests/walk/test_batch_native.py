@@ -127,11 +127,13 @@ def test_single_precision_between_calls_and_the_batch_in_jax_walk_alike():
     rng, pattern = np.random.default_rng(8), Reduced(ICUB)
     asked = (0.5 * commands(rng, 28)).astype(np.float32)
     circles = padded([np.array([[1.5, 0.4, 0.2]])] * 3 + [np.zeros((0, 3))] * 3)
-    _, in_jax = jax.jit(
-        lambda walk, rows: jax.lax.scan(
-            lambda w, v: (step_batch(pattern.problem, w, v, jnp.asarray(circles)),) * 2, walk, rows
-        )
-    )(start_batch(pattern.problem, WALKERS), jnp.asarray(asked))
+
+    def step(walk, velocities):
+        walk = step_batch(pattern.problem, walk, velocities, jnp.asarray(circles))
+        return walk, walk
+
+    start = start_batch(pattern.problem, WALKERS)
+    _, in_jax = jax.jit(lambda walk, rows: jax.lax.scan(step, walk, rows))(start, jnp.asarray(asked))
     double, single = (start_native(pattern.problem, WALKERS, dtype) for dtype in (np.float64, np.float32))
     for k, velocities in enumerate(asked):
         double = step_native(pattern.problem, double, velocities.astype(float), circles.astype(float))

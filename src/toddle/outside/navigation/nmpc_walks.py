@@ -47,7 +47,7 @@ class Walker(NamedTuple):
     """
 
     walk: BatchWalk
-    allowed: Float[Array, "*walkers 3"]
+    allowed: Float[Any, "*walkers 3"]
 
 
 def nmpc_walks(robot: Humanoid | Gait, *, solver: Solver = "auto", hold: int = 4, threads: int | None = None) -> Walks:

@@ -15,8 +15,9 @@ from jaxtyping import Float
 
 from toddle.walk.gate import ACCELERATION, BACKWARDS, TURNING
 from toddle.walk.pattern.batch import BatchWalk
-from toddle.walk.pattern.batch_native_kernels import Stride, walk_on
+from toddle.walk.pattern.batch_native_kernels import walk_on
 from toddle.walk.pattern.batch_state import PADDING, BatchPlan, BatchState, stacked
+from toddle.walk.pattern.command_kernels import Stride
 from toddle.walk.pattern.nmpc_problem import Nmpc
 from toddle.walk.pattern.reduced import Reduced, weight_shift
 
