@@ -47,10 +47,17 @@ PRESETS = {
     "obstacles": OBSTACLES,
     "people": OBSTACLES,
     "Pendulum-v1": PpoConfig(
-        steps=100_000, actors=16, horizon=128, minibatch=256, epochs=10, gamma=0.9, learning_rate=1e-3
+        steps=150_000,
+        actors=16,
+        horizon=128,
+        minibatch=256,
+        epochs=10,
+        gamma=0.9,
+        learning_rate=2e-3,
+        normalise_observations=False,
     ),
     "CartPole-v1": PpoConfig(
-        steps=60_000, actors=16, horizon=64, minibatch=256, epochs=8, gamma=0.99, learning_rate=1e-3
+        steps=100_000, actors=16, horizon=64, minibatch=256, epochs=8, gamma=0.99, learning_rate=1e-3
     ),
 }
 """By the name of what is learned."""
