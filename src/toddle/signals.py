@@ -10,7 +10,7 @@ from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 
 class Movement(NamedTuple):
@@ -125,6 +125,24 @@ class Senses(NamedTuple):
     gyro: Float[np.ndarray, "3"]
     acceleration: Float[np.ndarray, "3"]
     place: Float[np.ndarray, "3"]
+
+
+class DepthImage(NamedTuple):
+    """What two pictures tell of how far things are, in the rectified left camera.
+
+    Attributes:
+        disparity: [pixels]; NaN where none was found.
+        depth: along the optical axis [m]; NaN where it is not known.
+        confidence: 0 to 1.
+        valid: the pixel was seen by both cameras, is neither black nor saturated, and its confidence suffices.
+        trouble: what is wrong with the cameras, in words; empty: nothing was noticed.
+    """
+
+    disparity: Float[np.ndarray, "rows columns"]
+    depth: Float[np.ndarray, "rows columns"]
+    confidence: Float[np.ndarray, "rows columns"]
+    valid: Bool[np.ndarray, "rows columns"]
+    trouble: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
