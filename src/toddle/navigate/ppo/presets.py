@@ -57,7 +57,7 @@ PRESETS = {
         normalise_observations=False,
     ),
     "CartPole-v1": PpoConfig(
-        steps=100_000, actors=16, horizon=64, minibatch=256, epochs=8, gamma=0.99, learning_rate=1e-3
+        steps=100_000, actors=16, horizon=128, minibatch=256, epochs=8, learning_rate=1e-3, normalise_observations=False
     ),
 }
 """By the name of what is learned."""
