@@ -22,7 +22,7 @@ _PROG = "toddle navigate ppo"
 _DEFAULT = "goal"
 _STOPPED = 130
 _UNSEEN = 1_000_000  # seeds of trials lie so far from those of training
-_TASKS = ("robot", "config", "circles", "people", "sideways", "solver")
+_TASKS = ("robot", "config", "circles", "people", "sideways", "pace", "solver")
 _NUMBERS = (
     "steps", "actors", "horizon", "minibatch", "epochs", "gamma", "lambda_", "epsilon", "c1", "c2", "learning_rate",
     "schedule", "kl_limit", "hidden", "activation", "memory", "sequence", "bound", "deviation",
@@ -46,6 +46,7 @@ class Ppo:
         circles: at most so many obstacles.
         people: so many walk around.
         sideways: let it walk aside as well: a third action.
+        pace: greatest velocity, as a share of the robot's; 0.8 unless given.
         solver: of the walking pattern: native (this machine's cores), batch (accelerators) or auto.
         seed: of all randomness.
         seeds: so many runs side by side, each with the next seed.
@@ -81,6 +82,7 @@ class Ppo:
     circles: int | None = None
     people: int | None = None
     sideways: bool | None = None
+    pace: float | None = None
     solver: Literal["native", "batch", "auto"] | None = None
     seed: int = 0
     seeds: int = 1
@@ -194,7 +196,7 @@ def _job(asked: Ppo) -> Job:
     if asked.env is not None:
         source: dict[str, Any] = {"env": asked.env}
     else:
-        given = {key: getattr(asked, key) for key in ("robot", "circles", "people", "sideways", "solver")}
+        given = {key: getattr(asked, key) for key in ("robot", "circles", "people", "sideways", "pace", "solver")}
         given["robot_config"] = None if asked.config is None else str(asked.config)
         source = facts_of(source_named(name, **given))
     changes = {key: getattr(asked, key) for key in _NUMBERS if getattr(asked, key) is not None}

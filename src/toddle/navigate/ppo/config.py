@@ -41,7 +41,7 @@ class PpoConfig:
             is, and noise may go beyond (the document's).
         deviation: standard deviation of continuous actions at the start.
         normalise_observations: by their running mean and deviation.
-        normalise_rewards: by the running deviation of their discounted sum.
+        normalise_rewards: by the running deviation of their discounted sum; at most 10.
         normalise_advantages: in each minibatch.
     """
 

@@ -24,6 +24,9 @@ from toddle.navigate.ppo.network import ActorCritic, actor_critic
 from toddle.navigate.task import Outcome, Task
 
 
+_GREATEST = 10.0  # of a normalised reward
+
+
 class Training(NamedTuple):
     """A run between two updates.
 
@@ -110,7 +113,8 @@ def update(config: PpoConfig, training: Training, rollout: Rollout) -> tuple[Tra
     returns = training.returns.seen(rows.discounted.reshape(-1, 1))
     rewards = rows.reward
     if config.normalise_rewards:
-        rewards = rewards / jnp.sqrt(returns.variance[0] + 1e-8)
+        # bounded, for returns that hardly vary would make rewards of any size
+        rewards = jnp.clip(rewards / jnp.sqrt(returns.variance[0] + 1e-8), -_GREATEST, _GREATEST)
     rate, c2 = learning_rate(config, training.updates), _entropy_weight(config, rows.reward)
     found = learn(config, training.network, training.optimiser, rollout, rewards, rate, c2, shuffling)
     after = Training(found.network, found.optimiser, observations, returns, training.actors, key, training.updates + 1)

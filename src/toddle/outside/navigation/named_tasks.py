@@ -12,6 +12,7 @@ from toddle.navigate.task import Task
 from toddle.navigate.tasks.point import PointTask
 from toddle.navigate.tasks.unicycle import unicycle
 from toddle.navigate.tasks.walker import WalkerTask
+from toddle.navigate.walks import Walks
 from toddle.robots.humanoids import load_humanoid
 
 SAMPLES = 4
@@ -34,6 +35,8 @@ class TaskSource:
         sideways: whether it may be walked aside.
         observe: what the policy is shown; see `WalkerTask`.
         told: whether the walking pattern is told of obstacles, and may evade them by itself.
+        pace: greatest velocity that the policy may ask for, as a share of the robot's: at its greatest, ahead and
+            turning at once, the robot falls now and then in physics.
         solver: of the walking pattern; see `toddle.outside.navigation.nmpc_walks`.
     """
 
@@ -45,6 +48,7 @@ class TaskSource:
     sideways: bool = False
     observe: Literal["document", "full"] = "document"
     told: bool = True
+    pace: float = 0.8
     solver: Literal["native", "batch", "auto"] = "auto"
 
     def __post_init__(self) -> None:
@@ -57,6 +61,8 @@ class TaskSource:
             count = getattr(self, name)
             if not 0 <= count <= most:
                 raise BadInput(f"{count} is out of range", where=f"--{name}", remedy=f"give 0 to {most}")
+        if not 0 < self.pace <= 1:
+            raise BadInput(f"{self.pace} is out of range", where="--pace", remedy="give a share above 0, up to 1")
 
 
 TASKS = {
@@ -122,7 +128,16 @@ def walker_task(source: TaskSource) -> WalkerTask:
 
         config = None if source.robot_config is None else Path(source.robot_config)
         walks = nmpc_walks(load_humanoid(source.robot, config), solver=source.solver, hold=SAMPLES)
+    return task_with(walks, source)
+
+
+def task_with(walks: Walks, source: TaskSource) -> WalkerTask:
+    """The task of a walker, at the pace that is asked for."""
+    vx, vy, omega = walks.fastest
+    slower = replace(
+        walks, fastest=(source.pace * vx, source.pace * vy, source.pace * omega), slowest=source.pace * walks.slowest
+    )
     return WalkerTask(
-        walks, circles=source.circles, people=source.people, sideways=source.sideways, observe=source.observe,
+        slower, circles=source.circles, people=source.people, sideways=source.sideways, observe=source.observe,
         told=source.told,
     )  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ from toddle.failures import BadInput
 from toddle.navigate.driver import Driver, Learned, Situation, Steering, Timed
 from toddle.navigate.policy import Policy
 from toddle.navigate.tasks.walker import WalkerTask
-from toddle.outside.navigation.named_tasks import SAMPLES, TaskSource, source_from
+from toddle.outside.navigation.named_tasks import SAMPLES, TaskSource, source_from, task_with
 from toddle.outside.navigation.nmpc_walks import nmpc_walks
 from toddle.outside.navigation.policy_files import load_policy
 from toddle.outside.simulation.humanoid import HumanoidSimulation
@@ -94,11 +93,7 @@ def walking_source(policy: Policy, folder: Path) -> TaskSource:
 
 def task_for(humanoid: Humanoid, source: TaskSource) -> WalkerTask:
     """The task as a robot meets it: in its frame, with its greatest velocities."""
-    task = WalkerTask(
-        nmpc_walks(humanoid, hold=SAMPLES), circles=source.circles, people=source.people, sideways=source.sideways,
-        observe=source.observe,
-    )  # fmt: skip
-    return replace(task, told=source.told)
+    return task_with(nmpc_walks(humanoid, hold=SAMPLES), source)
 
 
 def scripted(_: Humanoid, path: Path) -> Timed:
