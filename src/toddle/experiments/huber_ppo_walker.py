@@ -1,10 +1,11 @@
 """The walking pattern and PPO together (Huber 2019, section 4.3.2, figure 4.32): a policy steers the walker to goals.
 
-The predictive controller runs in the loop, every iteration of it. First as the document did: one robot, an update each
-2,000 actions, minibatches of 200, five epochs of PPO, a learning rate of 0.003, c2 = -50, 50 epochs. Its reward is that
-of `toddle.navigate.tasks.rewards.DOCUMENT`, divided by 600, and so is its c2. (--quick makes five of the epochs.) Then with our numbers. What the document
-does not say: one action lasts 0.4 s (its sample), goals lie 0.5 to 3 m away in any direction, and are reached within
-0.2 m. In full, the policies that were trained on the pattern alone then walk the robot in physics.
+The predictive controller runs in the loop, every iteration of it. First as the document did: one robot, an update
+each 2,000 actions, minibatches of 200, five epochs of PPO, a learning rate of 0.003, c2 = -50, 50 epochs (--quick:
+five). Its reward is that of `toddle.navigate.tasks.rewards.DOCUMENT`, divided by 600, and so is its c2. Then with our
+numbers. What the document does not say: one action lasts 0.4 s (its sample), goals lie 0.5 to 3 m away in any
+direction, and are reached within 0.2 m. In full, the policies that were trained on the pattern alone then walk the
+robot in physics.
 """
 
 from __future__ import annotations

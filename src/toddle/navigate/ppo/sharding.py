@@ -6,6 +6,7 @@ A run that lies so is trained by the same `train`: the compiler splits the work 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import jax
 import numpy as np
@@ -15,8 +16,8 @@ from toddle.failures import BadInput
 from toddle.navigate.ppo.training import Training
 
 
-def shard(training: Training, devices: Sequence[jax.Device]) -> Training:
-    """The same run, on these devices: arrays of its actors split along their first axis, all else copied to each.
+def shard(training: Training, devices: Sequence[Any]) -> Training:
+    """The same run, on these devices of JAX's: arrays of its actors split along their first axis, all else copied to each.
 
     Raises:
         BadInput: no devices, or actors that can't be shared evenly.

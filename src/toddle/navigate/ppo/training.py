@@ -23,7 +23,6 @@ from toddle.navigate.ppo.moments import Moments, unseen
 from toddle.navigate.ppo.network import ActorCritic, actor_critic
 from toddle.navigate.task import Outcome, Task
 
-
 _GREATEST = 10.0  # of a normalised reward
 
 
