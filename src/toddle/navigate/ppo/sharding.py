@@ -17,7 +17,7 @@ from toddle.navigate.ppo.training import Training
 
 
 def shard(training: Training, devices: Sequence[Any]) -> Training:
-    """The same run, on these devices of JAX's: arrays of its actors split along their first axis, all else copied to each.
+    """The same run, on devices of JAX: arrays of its actors split along their first axis, all else copied to each.
 
     Raises:
         BadInput: no devices, or actors that can't be shared evenly.
