@@ -102,7 +102,7 @@ def test_commands_are_widened_and_capped_as_for_one(gait):
         slow = jax.vmap(lambda v: command.cap(gait, v))(jnp.array(asked))
     np.testing.assert_array_equal(fit, [fits(v, gait) for v in asked])
     np.testing.assert_allclose(wide, [widening(v, gait) or 0.0 for v in asked], atol=1e-9)
-    np.testing.assert_allclose(slow, [cap(v, gait) for v in asked], atol=1e-6)
+    np.testing.assert_allclose(slow, np.array([cap(v, gait) for v in asked]), atol=1e-6)
 
 
 def test_walks_close_over_themselves_as_one_does():
