@@ -10,12 +10,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from toddle.cli.arguments import parse
+from toddle.cli.navigate_folder import left_folder, refuse_used
 from toddle.failures import BadInput
 
 if TYPE_CHECKING:
+    from toddle.navigate.policy import Policy
     from toddle.outside.navigation.course import Course, Finish
+    from toddle.outside.navigation.named_tasks import TaskSource
+    from toddle.outside.navigation.physics_batch import Recipe
 
 _PROG = "toddle navigate evaluate"
+_STAND_IN = "heicub"  # in physics, for who learned on wheels
 _MOST = {"episodes": 100_000, "jobs": 1024, "circles": 20, "people": 10}
 
 
@@ -95,27 +100,23 @@ def _check(asked: Evaluate) -> None:
         raise BadInput(f"{asked.seed} is out of range", where="--seed", remedy=f"give 0 to {2**31 - 1}")
     if asked.noise is not None and not 0 <= asked.noise <= 1000:
         raise BadInput(f"{asked.noise:g} is out of range", where="--noise", remedy="give 0 to 1000")
+    refuse_used(asked.out)
 
 
 def _judge_in_physics(asked: Evaluate) -> int:
-    from toddle.cli.run_folder import new_folder
     from toddle.outside.navigation.course import Rules, summary
-    from toddle.outside.navigation.named_tasks import TASKS, source_named
     from toddle.outside.navigation.physics_batch import run_courses
     from toddle.outside.navigation.policy_files import load_policy
-    from toddle.outside.navigation.steered import walking_source
     from toddle.outside.terminal import Reporter, stoppable
 
     policy = None if asked.policy is None else load_policy(asked.policy)
-    source = TASKS["goal"] if policy is None or asked.policy is None else walking_source(policy, asked.policy)
-    task = source.task if source.task != "point" else "goal"
-    source = source_named(task, robot=asked.robot or source.robot, sideways=source.sideways, told=source.told,
-        circles=source.circles if asked.circles is None else asked.circles,
-        people=source.people if asked.people is None else asked.people)  # fmt: skip
-    robot = "heicub" if source.robot == "unicycle" else source.robot
+    source, recipe = _made(asked, policy)
     courses = draw_courses(asked.seed, asked.episodes, source.circles, source.people, Rules().seconds)
-    folder = new_folder(asked.out, "evaluate")
-    with stoppable() as stop, Reporter(f"{robot} in physics, courses", len(courses), quiet=asked.json) as reporter:
+    with (
+        left_folder(asked.out, "evaluate") as folder,
+        stoppable() as stop,
+        Reporter(f"{recipe.robot} in physics, courses", len(courses), quiet=asked.json) as reporter,
+    ):
         done: list[Finish] = []
 
         def told(_: int, finish: Finish) -> None:
@@ -124,21 +125,45 @@ def _judge_in_physics(asked: Evaluate) -> int:
             reporter.tell(len(done), f"{won} of {len(done)} reached")
 
         finishes = run_courses(
-            _recipe(asked, robot, source.robot_config), courses, Rules(told=source.told), world=_world(asked),
-            seed=asked.seed, processes=asked.jobs, progress=told, stopped=lambda: stop.asked,
+            recipe, courses, Rules(told=source.told), world=_world(asked), seed=asked.seed, processes=asked.jobs,
+            progress=told, stopped=lambda: stop.asked,
         )  # fmt: skip
-    pairs = [(course, finish) for course, finish in zip(courses, finishes, strict=True) if finish is not None]
-    if not pairs:
-        return 130
-    found = summary([finish for _, finish in pairs])
-    figures = {
-        "env": source.task, "robot": robot, "driver": asked.driver, "physics": True, "seed": asked.seed,
-        "circles": source.circles, "people": source.people, **_judged(found),
-        **({} if policy is None else learned_figures(policy.figures)),
-    }  # fmt: skip
-    _leave(folder, figures, pairs, f"{robot}: {found['won']} of {len(pairs)} goals")
+        pairs = [(course, finish) for course, finish in zip(courses, finishes, strict=True) if finish is not None]
+        if not pairs:
+            return 130
+        found = summary([finish for _, finish in pairs])
+        figures = {
+            "env": source.task, "robot": recipe.robot, "driver": asked.driver, "physics": True, "seed": asked.seed,
+            "circles": source.circles, "people": source.people, **_judged(found),
+            **({} if policy is None else learned_figures(policy.figures)),
+        }  # fmt: skip
+        _leave(folder, figures, pairs, f"{recipe.robot}: {found['won']} of {len(pairs)} goals")
     tell(figures, folder, as_json=asked.json)
     return 130 if stop.asked else 0
+
+
+def _made(asked: Evaluate, policy: Policy | None) -> tuple[TaskSource, Recipe]:
+    """The task, and who steers whom; made once here, so that what can't be made is refused before anything begins.
+
+    Raises:
+        BadInput: the robot, the policy or the script is of no use.
+    """
+    from dataclasses import replace
+
+    from toddle.outside.navigation.named_tasks import TASKS, UNICYCLE
+    from toddle.outside.navigation.steered import walking_source
+    from toddle.robots.humanoids import load_humanoid
+
+    source = TASKS["goal"] if policy is None or asked.policy is None else walking_source(policy, asked.policy)
+    if asked.robot == UNICYCLE:
+        raise BadInput("an ideal robot has no body", where="--robot", remedy="name a humanoid, or add --pattern")
+    robot = asked.robot or (_STAND_IN if source.robot == UNICYCLE else source.robot)
+    known = None if source.robot_config is None or robot != source.robot else Path(source.robot_config)
+    given = {"circles": asked.circles, "people": asked.people}
+    source = replace(source, **{name: value for name, value in given.items() if value is not None})
+    recipe = _recipe(asked, robot, asked.config or known)
+    _ = recipe.make(load_humanoid(recipe.robot, recipe.config), *recipe.given)
+    return source, recipe
 
 
 def draw_courses(seed: int, count: int, circles: int, people: int, seconds: float) -> list[Course]:
@@ -164,21 +189,20 @@ def learned_figures(figures: Any) -> dict[str, Any]:
     return {name: figures[name] for name in names if name in figures}
 
 
-def _recipe(asked: Evaluate, robot: str, config: str | None) -> Any:
+def _recipe(asked: Evaluate, robot: str, config: Path | None) -> Recipe:
     from toddle.outside.navigation.guided import Guided
     from toddle.outside.navigation.physics_batch import Recipe, baseline, same
     from toddle.outside.navigation.steered import learned, scripted
 
-    file = asked.config or (None if config is None else Path(config))
     match asked.driver:
         case "policy":
-            return Recipe(learned, (asked.policy,), robot, file)
+            return Recipe(learned, (asked.policy,), robot, config)
         case "baseline":
-            return Recipe(baseline, (), robot, file)
+            return Recipe(baseline, (), robot, config)
         case "guide":
-            return Recipe(same, (Guided(),), robot, file)
+            return Recipe(same, (Guided(),), robot, config)
         case "script":
-            return Recipe(scripted, (asked.script,), robot, file)
+            return Recipe(scripted, (asked.script,), robot, config)
 
 
 def _world(asked: Evaluate) -> Any:
@@ -225,7 +249,7 @@ def tell(figures: dict[str, Any], folder: Path, *, as_json: bool) -> None:
     if as_json:
         print(json.dumps(finite({**figures, "folder": str(folder)})))
         return
-    shown = [(name.replace("_", " "), _shown(value)) for name, value in figures.items()]
+    shown = [(name.replace("_", " "), _shown(value)) for name, value in figures.items() if value is not None]
     print_table(str(figures.get("env", "")), ("", "this run"), shown)
     print(f"figures and pictures: {folder}")
     sys.stdout.flush()

@@ -5,29 +5,27 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from toddle.cli.arguments import parse
+from toddle.cli.navigate_folder import refuse_used
+from toddle.cli.navigate_learning import NUMBERS, PROG, UNSEEN, job_of, learned
 from toddle.cli.options import POSITIONAL
 from toddle.failures import BadInput
 
 if TYPE_CHECKING:
     from toddle.navigate.policy import Policy
-    from toddle.navigate.ppo.config import PpoConfig
     from toddle.outside.navigation.ppo_run import Run
 
-_PROG = "toddle navigate ppo"
-_DEFAULT = "goal"
 _STOPPED = 130
-_UNSEEN = 1_000_000  # seeds of trials lie so far from those of training
 _TASKS = ("robot", "config", "circles", "people", "sideways", "pace", "solver")
-_NUMBERS = (
-    "steps", "actors", "horizon", "minibatch", "epochs", "gamma", "lambda_", "epsilon", "c1", "c2", "learning_rate",
-    "schedule", "kl_limit", "hidden", "activation", "memory", "sequence", "bound", "deviation",
-)  # fmt: skip
-_LARGEST = 2**40
+_MOST = {
+    "steps": 2**40, "actors": 2**20, "horizon": 2**20, "minibatch": 2**24, "epochs": 1000, "memory": 4096,
+    "sequence": 2**20, "episodes": 100_000, "seeds": 256, "seed": UNSEEN - 1,
+}  # fmt: skip
+_WIDEST = 2**14  # layer
 
 
 @dataclass(frozen=True)
@@ -48,8 +46,8 @@ class Ppo:
         sideways: let it walk aside as well: a third action.
         pace: greatest velocity, as a share of the robot's; 0.8 unless given.
         solver: of the walking pattern: native (this machine's cores), batch (accelerators) or auto.
-        seed: of all randomness.
-        seeds: so many runs side by side, each with the next seed.
+        seed: of all randomness; 0 unless given.
+        seeds: so many runs side by side, each with the next seed; 1 unless given.
         steps: to train for.
         actors: copies of the task side by side (N).
         horizon: steps of each between two updates (T).
@@ -84,8 +82,8 @@ class Ppo:
     sideways: bool | None = None
     pace: float | None = None
     solver: Literal["native", "batch", "auto"] | None = None
-    seed: int = 0
-    seeds: int = 1
+    seed: int | None = None
+    seeds: int | None = None
     steps: int | None = None
     actors: int | None = None
     horizon: int | None = None
@@ -111,149 +109,79 @@ class Ppo:
     json: bool = False
 
 
-class Job(NamedTuple):
-    """What is to be learned, and how.
-
-    Attributes:
-        name: of the task or the environment.
-        source: how the task is made again.
-        config: of the learning.
-        folder: of the run.
-        resumed: the run in the folder goes on.
-    """
-
-    name: str
-    source: Mapping[str, Any]
-    config: PpoConfig
-    folder: Path
-    resumed: bool
-
-
 def main(argv: Sequence[str]) -> int:
     """Learn, judge, leave a folder; returns the exit code."""
-    asked = parse(Ppo, argv, prog=_PROG)
+    asked = parse(Ppo, argv, prog=PROG)
     _check(asked)
     from toddle.cli.navigate_evaluate import tell
     from toddle.outside.files import write_json
     from toddle.outside.navigation.learning_pictures import learning_curve
-    from toddle.outside.versions import versions
 
-    job = _job(asked)
+    job = job_of(asked)
     began = time.perf_counter()
-    run, judge = _learned(asked, job)
-    seconds = time.perf_counter() - began
-    figures = _figures(run, judge, asked, seconds)
-    facts = {"source": dict(job.source), "seed": asked.seed, "seeds": asked.seeds, "versions": versions()}
-    write_json(job.folder / "config.json", facts)
-    write_json(job.folder / "figures.json", figures)
+    run, judge, folder = learned(asked, job)
     if run.history:
-        learning_curve(job.folder / "learning.png", run.history, title=f"{job.name}: learning")
-    tell(figures, job.folder, as_json=asked.json)
+        learning_curve(folder / "learning.png", run.history, title=f"{job.name}: learning")
+    figures = _figures(run, judge, job.seed)
+    figures["wall_seconds"] = time.perf_counter() - began
+    write_json(folder / "figures.json", figures)
+    tell(figures, folder, as_json=asked.json)
     if run.stopped is not None:
-        print(f"toddle: {job.name}: {run.stopped}; {_remedy(run, job)}", file=sys.stderr)
+        print(f"toddle: {job.name}: {run.stopped}; {_remedy(run, folder)}", file=sys.stderr)
     return 1 if run.diverged else _STOPPED if run.stopped else 0
 
 
 def _check(asked: Ppo) -> None:
     """Refuse what contradicts itself or is out of range before anything heavy is imported."""
     if asked.task is not None and asked.env is not None:
-        raise BadInput(f"--env and {asked.task} exclude each other", where=_PROG, remedy="give one")
+        raise BadInput(f"--env and {asked.task} exclude each other", where=PROG, remedy="give one")
     if asked.env is not None and (useless := [name for name in _TASKS if getattr(asked, name) is not None]):
         raise BadInput("a Gymnasium environment knows no such thing", where=f"--{useless[0]}", remedy="leave it out")
-    if asked.env is not None and asked.seeds > 1:
+    if asked.env is not None and (asked.seeds or 1) > 1:
         raise BadInput("an environment is learned one seed at a time", where="--seeds", remedy="leave it out")
-    for name in ("steps", "actors", "horizon", "minibatch", "epochs", "memory", "sequence", "episodes", "seeds"):
-        value = getattr(asked, name)
-        least = 0 if name == "memory" else 1
-        if value is not None and not least <= value <= _LARGEST:
-            raise BadInput(f"{value} is out of range", where=f"--{name}", remedy=f"give {least} or more")
-    if not 0 <= asked.seed < _UNSEEN:
-        raise BadInput(f"{asked.seed} is out of range", where="--seed", remedy=f"give 0 to {_UNSEEN - 1}")
+    for name, most in _MOST.items():
+        value, least = getattr(asked, name), 0 if name in ("memory", "seed") else 1
+        if value is not None and not least <= value <= most:
+            raise BadInput(f"{value} is out of range", where=f"--{name}", remedy=f"give {least} to {most}")
+    if wrong := [units for units in asked.hidden or () if not 1 <= units <= _WIDEST]:
+        raise BadInput(f"{wrong[0]} is out of range", where="--hidden", remedy=f"give 1 to {_WIDEST}")
     if asked.resume is None:
-        if asked.out is not None and (asked.out / "checkpoint.json").exists():
-            remedy = f"go on with --resume {asked.out}, or name another"
-            raise BadInput("it holds a run already", where=f"--out {asked.out}", remedy=remedy)
+        refuse_used(asked.out)
         return
-    given = [name for name in ("task", "env", "out", *_TASKS, *_NUMBERS) if getattr(asked, name) is not None]
+    given = [
+        name for name in ("task", "env", "out", "seed", "seeds", *_TASKS, *NUMBERS) if getattr(asked, name) is not None
+    ]
     given = [name for name in given if name != "steps"]
     if given:
         flag = given[0] if given[0] == "task" else f"--{given[0].rstrip('_').replace('_', '-')}"
-        raise BadInput(f"{flag} can't be changed in a run that goes on", where=_PROG, remedy="leave it out")
+        raise BadInput(f"{flag} can't be changed in a run that goes on", where=PROG, remedy="leave it out")
 
 
-def _job(asked: Ppo) -> Job:
-    from toddle.cli.run_folder import new_folder
-    from toddle.navigate.ppo.presets import preset
-    from toddle.outside.navigation.named_tasks import facts_of, source_named
-    from toddle.outside.navigation.training_files import read_training
+def _figures(run: Run, judge: Callable[[Policy, int], dict[str, Any]], seed: int) -> dict[str, Any]:
+    """Of the run and, on starts that neither training nor its trials saw, of what it learned.
 
-    if asked.resume is not None:
-        config, source = read_training(asked.resume)
-        if asked.steps is not None:
-            config = replace(config, steps=asked.steps)
-        return Job(str(source.get("env") or source.get("task")), source, config, asked.resume, True)
-    name = asked.env or asked.task or _DEFAULT
-    if asked.env is not None:
-        source: dict[str, Any] = {"env": asked.env}
-    else:
-        given = {key: getattr(asked, key) for key in ("robot", "circles", "people", "sideways", "pace", "solver")}
-        given["robot_config"] = None if asked.config is None else str(asked.config)
-        source = facts_of(source_named(name, **given))
-    changes = {key: getattr(asked, key) for key in _NUMBERS if getattr(asked, key) is not None}
-    config = replace(preset(name), **changes)
-    return Job(name, source, config, new_folder(asked.out, name.replace("/", "-")), False)
+    Who stopped it is not kept waiting for another trial: the best one while it learned is told instead.
+    """
+    told = dict(run.figures)
+    if run.stopped is not None and not run.diverged:
+        return told
+    left_out = ("marks", "judged", "troubles") if not run.diverged else ("marks", "judged")
+    told = {name: value for name, value in told.items() if name not in left_out}
+    found = [judge(policy, UNSEEN + seed + number) for number, policy in enumerate(run.policies)]
+    return told | (found[0] if len(found) == 1 else {**_over_seeds(found), "each_seed": found})
 
 
-def _learned(asked: Ppo, job: Job) -> tuple[Run, Callable[[Policy, int], dict[str, Any]]]:
-    """The run, and what judges its policies."""
-    import jax
-
-    from toddle.outside.navigation.gym_training import GymTraining
-    from toddle.outside.navigation.judging import judge, judge_gym, score
-    from toddle.outside.navigation.named_tasks import make_task, source_from
-    from toddle.outside.navigation.ppo_run import Plan, run
-    from toddle.outside.terminal import Reporter, stoppable
-
-    updates = job.config.updates
-    saved, judged = max(updates // 20, 1), max(updates // 8, 1)
-    plan = Plan(job.folder, job.name, job.source, asked.seed, asked.seeds, saved, judged)
-    with stoppable() as stop, Reporter(f"{job.name}, steps", job.config.steps, quiet=asked.json) as reporter:
-        if "env" in job.source:
-            gym = GymTraining(job.name, job.config, anew_every=saved)
-            try:
-                begun = gym.init(jax.random.key(asked.seed))
-                found = run(
-                    gym.copies.spaces, job.config, plan, advance=gym.advance, begun=begun, resume=job.resumed,
-                    reporter=reporter, stop=stop,
-                )  # fmt: skip
-            finally:
-                gym.close()
-            return found, lambda policy, seed: judge_gym(job.name, policy, seed, asked.episodes)
-        task = make_task(source_from(job.source))
-
-        def tried(policy: Policy, seed: int) -> dict[str, Any]:
-            return judge(task, policy, seed, asked.episodes)
-
-        def marked(policy: Policy) -> dict[str, Any]:
-            figures = tried(policy, _UNSEEN - 1)
-            return {**figures, "score": score(figures)}
-
-        found = run(task, job.config, plan, judge=marked, resume=job.resumed, reporter=reporter, stop=stop)
-    return found, tried
+def _over_seeds(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Means over seeds; of what is a least or a lower end, the least."""
+    return {
+        name: min(one[name] for one in found)
+        if name.endswith(("_least", "_low"))
+        else sum(one[name] for one in found) / len(found)
+        for name in found[0]
+    }
 
 
-def _figures(run: Run, judge: Callable[[Policy, int], dict[str, Any]], asked: Ppo, seconds: float) -> dict[str, Any]:
-    """Of the run and, on starts that neither training nor its trials saw, of what it learned."""
-    told = {name: value for name, value in run.figures.items() if name not in ("marks", "judged", "troubles")}
-    told["wall_seconds"] = seconds
-    found = [judge(policy, _UNSEEN + asked.seed + number) for number, policy in enumerate(run.policies)]
-    told |= found[0]
-    if len(found) > 1:
-        told["each_seed"] = found
-    return told
-
-
-def _remedy(run: Run, job: Job) -> str:
+def _remedy(run: Run, folder: Path) -> str:
     if run.diverged:
-        return f"the last good policy and checkpoint are in {job.folder}"
-    return f"go on with --resume {job.folder}"
+        return f"the last good policy and checkpoint are in {folder}"
+    return f"go on with {PROG} --resume {folder}"

@@ -21,6 +21,7 @@ from toddle.navigate.task import Outcome, Task
 from toddle.navigate.tasks.walker import WalkerTask
 from toddle.navigate.trial import Episode, episodes_from, tally
 from toddle.outside.navigation.gym_trial import gym_episodes
+from toddle.outside.navigation.named_tasks import refuse_unfit
 from toddle.outside.navigation.statistics import wilson
 
 TESTS, TEST_STEPS = 10, 10_000
@@ -28,7 +29,12 @@ TESTS, TEST_STEPS = 10, 10_000
 
 
 def judge(task: Task[Any], policy: Policy, seed: int, episodes: int) -> dict[str, Any]:
-    """Figures of a policy on its task; see `walked` and `tested`."""
+    """Figures of a policy on its task; see `walked` and `tested`.
+
+    Raises:
+        BadInput: the policy sees or does something else.
+    """
+    refuse_unfit(policy, task)
     if isinstance(task, WalkerTask):
         return walked(task, policy, seed, episodes)
     return tested(task, policy, seed)

@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_type_hints
 
 from toddle.failures import BadInput, unknown_name
+from toddle.navigate.policy import Policy
 from toddle.navigate.task import Task
 from toddle.navigate.tasks.point import PointTask
 from toddle.navigate.tasks.unicycle import unicycle
 from toddle.navigate.tasks.walker import WalkerTask
 from toddle.navigate.walks import Walks
+from toddle.outside.navigation.policy_files import is_a
 from toddle.robots.humanoids import load_humanoid
 
 SAMPLES = 4
 """Iterations of the walking pattern that one action lasts."""
 
+UNICYCLE = "unicycle"
+"""Who is no humanoid: an ideal robot on wheels, to try things out with."""
+
 _MOST = {"circles": 20, "people": 10}
+_OF_A_PATTERN = ("robot_config", "solver")
+_OF_A_WALKER = ("robot", "circles", "people", "sideways", "observe", "told", "pace", *_OF_A_PATTERN)
 
 
 @dataclass(frozen=True)
@@ -84,8 +91,11 @@ def source_named(name: str, **changes: Any) -> TaskSource:
         raise unknown_name("task", name, TASKS, where="toddle navigate ppo")
     source = TASKS[name]
     given = {key: value for key, value in changes.items() if value is not None}
-    if name == "point" and (useless := [key for key in given if given[key] != getattr(source, key)]):
-        raise BadInput("the point knows no such thing", where=f"--{useless[0]}", remedy="leave it out")
+    who, of_others = ("the point", _OF_A_WALKER) if name == "point" else ("an ideal robot on wheels", _OF_A_PATTERN)
+    alone = name == "point" or given.get("robot") == UNICYCLE
+    if alone and (useless := [key for key in of_others if key in given and given[key] != getattr(source, key)]):
+        where = "--config" if useless[0] == "robot_config" else f"--{useless[0]}"
+        raise BadInput(f"{who} knows no such thing", where=where, remedy="leave it out")
     if (given.get("circles") or given.get("people")) and source.observe == "document":
         given["observe"] = "full"
     return replace(source, **given)
@@ -97,10 +107,25 @@ def source_from(facts: Mapping[str, Any]) -> TaskSource:
     Raises:
         BadInput: the facts are those of no task.
     """
-    known = {part.name for part in fields(TaskSource)}
-    if not set(facts) <= known or facts.get("task") not in TASKS:
+    hints = get_type_hints(TaskSource)
+    if not set(facts) <= set(hints) or not all(is_a(hints[name], value) for name, value in facts.items()):
         raise BadInput("it was learned on no task of toddle's", where="policy", remedy="name another --policy")
     return TaskSource(**facts)
+
+
+def refuse_unfit(policy: Policy, task: Task[Any]) -> None:
+    """Refuses a policy that sees or does something else than its task.
+
+    Raises:
+        BadInput: what of it.
+    """
+    if policy.observations != task.observations:
+        what = f"it sees {policy.observations} numbers, its task shows {task.observations}"
+    elif policy.actions != task.actions:
+        what = f"its actions are {policy.actions}, its task's {task.actions}"
+    else:
+        return
+    raise BadInput(what, where="policy", remedy="name another --policy")
 
 
 def facts_of(source: TaskSource) -> dict[str, Any]:
@@ -121,7 +146,7 @@ def make_task(source: TaskSource) -> Task[Any]:
 
 def walker_task(source: TaskSource) -> WalkerTask:
     """A task with a walker; see `make_task`."""
-    if source.robot == "unicycle":
+    if source.robot == UNICYCLE:
         walks = unicycle(seconds=0.4)
     else:
         from toddle.outside.navigation.nmpc_walks import nmpc_walks

@@ -9,7 +9,8 @@ import dataclasses
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from types import NoneType, UnionType
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import jax
 import jax.numpy as jnp
@@ -82,7 +83,7 @@ def config_from(facts: Mapping[str, Any]) -> PpoConfig:
         name: tuple(value) if isinstance(value, list) else value for name, value in facts.items()
     }
     for name, value in fitting.items():
-        if name not in hints or not _is_a(hints[name], value):
+        if name not in hints or not is_a(hints[name], value):
             raise ValueError(f"{name} is {value!r}")
     return PpoConfig(**fitting)
 
@@ -183,12 +184,14 @@ def _positive(value: Any, name: str) -> int:
     return value
 
 
-def _is_a(hint: Any, value: Any) -> bool:
-    """Whether a value is of a field's type: a number, a text out of several, or whole numbers."""
+def is_a(hint: Any, value: Any) -> bool:
+    """Whether a value is of a field's type: a number, a text, one out of several or none, or whole numbers."""
+    if get_origin(hint) in (Union, UnionType):
+        return any(is_a(one, value) for one in get_args(hint))
     if get_origin(hint) is Literal:
         return value in get_args(hint)
     if hint is float:
         return isinstance(value, int | float) and not isinstance(value, bool)
-    if hint in (int, bool):
+    if hint in (int, bool, str, NoneType):
         return type(value) is hint
     return isinstance(value, tuple) and all(type(one) is int for one in value)

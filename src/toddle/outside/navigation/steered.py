@@ -11,7 +11,7 @@ from toddle.failures import BadInput
 from toddle.navigate.driver import Driver, Learned, Situation, Steering, Timed
 from toddle.navigate.policy import Policy
 from toddle.navigate.tasks.walker import WalkerTask
-from toddle.outside.navigation.named_tasks import SAMPLES, TaskSource, source_from, task_with
+from toddle.outside.navigation.named_tasks import SAMPLES, TaskSource, refuse_unfit, source_from, task_with
 from toddle.outside.navigation.nmpc_walks import nmpc_walks
 from toddle.outside.navigation.policy_files import load_policy
 from toddle.outside.simulation.humanoid import HumanoidSimulation
@@ -72,10 +72,12 @@ def learned(humanoid: Humanoid, folder: Path) -> Learned:
     """The policy in a folder, steering a robot.
 
     Raises:
-        BadInput: there is none, or it did not learn to walk.
+        BadInput: there is none, it did not learn to walk, or it sees something else than its task shows.
     """
     policy = load_policy(folder)
-    return Learned(policy, task_for(humanoid, walking_source(policy, folder)))
+    task = task_for(humanoid, walking_source(policy, folder))
+    refuse_unfit(policy, task)
+    return Learned(policy, task)
 
 
 def walking_source(policy: Policy, folder: Path) -> TaskSource:
