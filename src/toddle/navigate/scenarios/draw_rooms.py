@@ -110,7 +110,7 @@ def _attempt(draw: np.random.Generator, scenario: Scenario, split: Split, number
     if hall is None:
         return None
     red = furniture.extinguisher(draw, room_styles.RED_PAINT, room_styles.BLACK, room_styles.LABEL)
-    target = furniture.stand("extinguisher", red, *end.tolist(), float(draw.uniform(-math.pi, math.pi)))
+    target = furniture.stand("extinguisher", red, end, float(draw.uniform(-math.pi, math.pi)))
     walkers = _walkers(draw, scenario, hall, end)
     first = _in_the_way(draw, end) if scenario == "obstacle" else ()
     first += _decoys(draw, hall, target) if scenario == "decoys" else ()
@@ -153,7 +153,7 @@ def _furnish(
         covers = room_styles.furniture_surface(number), room_styles.METAL
         parts = furniture.FURNITURE[kind](draw, covers)
         for _ in range(_PLACES):
-            thing = furniture.stand(kind, parts, *_somewhere(draw, hall).tolist(), float(draw.uniform(-3.2, 3.2)))
+            thing = furniture.stand(kind, parts, _somewhere(draw, hall), float(draw.uniform(-3.2, 3.2)))
             if _fits(thing, hall, end, things) and _beside(thing, np.zeros(2), end, _FROM_WAY):
                 if not all(_lets_pass(thing, person) for person in walkers):
                     continue
@@ -170,7 +170,7 @@ def _in_the_way(draw: np.random.Generator, end: _Point) -> tuple[Thing, ...]:
     share, aside = draw.uniform(0.42, 0.58), draw.uniform(-0.22, 0.22)
     across = np.array([-end[1], end[0]]) / np.hypot(*end)
     place = share * end + aside * across
-    return (furniture.stand(kind, parts, *place.tolist(), float(draw.uniform(-math.pi, math.pi))),)
+    return (furniture.stand(kind, parts, place, float(draw.uniform(-math.pi, math.pi))),)
 
 
 def _decoys(draw: np.random.Generator, hall: Hall, target: Thing) -> tuple[Thing, ...]:
@@ -182,8 +182,8 @@ def _decoys(draw: np.random.Generator, hall: Hall, target: Thing) -> tuple[Thing
         parts = furniture.DECOYS[kind](draw, (room_styles.DECOY, room_styles.METAL))
         for _ in range(_PLACES):
             far, aside = draw.uniform(1.2, 3.8), draw.uniform(-1.05, 1.05)
-            place = far * math.cos(aside), far * math.sin(aside)
-            thing = furniture.stand(f"red {kind}", parts, *place, float(draw.uniform(-math.pi, math.pi)))
+            place = far * np.array([math.cos(aside), math.sin(aside)])
+            thing = furniture.stand(f"red {kind}", parts, place, float(draw.uniform(-math.pi, math.pi)))
             if _fits(thing, hall, end, found) and _beside(thing, np.zeros(2), end, _FROM_WAY):
                 found.append(thing)
                 break
@@ -202,7 +202,7 @@ def _walkers(draw: np.random.Generator, scenario: Scenario, hall: Hall, end: _Po
         a, b = _somewhere(draw, hall), _somewhere(draw, hall)
         clear = furniture.PERSON_RADIUS + _FROM_START
         off = min(_gap(a, b, share * end) for share in np.linspace(0.0, 1.0, 9))
-        if 1.0 <= np.hypot(*(b - a)) and off >= clear and hall.inside(np.stack([a, b])).min() >= 0.35:
+        if np.hypot(*(b - a)) >= 1.0 and off >= clear and hall.inside(np.stack([a, b])).min() >= 0.35:
             return (_person(draw, (a, b, a), draw.uniform(1.0, 5.0), math.inf),)
     return ()
 

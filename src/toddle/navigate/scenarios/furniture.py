@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
+from jaxtyping import Float
 
 from toddle.navigate.scenarios.rooms import Part, Thing
 
@@ -20,9 +21,9 @@ PERSON_RADIUS = 0.25
 """Of the circle that a person takes [m]."""
 
 
-def stand(kind: str, parts: tuple[Part, ...], x: float, y: float, yaw: float) -> Thing:
-    """A thing at its place."""
-    return Thing(kind, x, y, yaw, max(map(_reach, parts)), parts)
+def stand(kind: str, parts: tuple[Part, ...], place: Float[np.ndarray, "2"], yaw: float) -> Thing:
+    """A thing at its place [m], turned by yaw [rad]."""
+    return Thing(kind, float(place[0]), float(place[1]), yaw, max(map(_reach, parts)), parts)
 
 
 def extinguisher(draw: np.random.Generator, red: int, black: int, label: int) -> tuple[Part, ...]:

@@ -184,8 +184,8 @@ def shade(
             while fine < 0.75 * width and level < len(sizes) - 1:
                 level, fine = level + 1, 2 * fine
             side = sizes[level]
-            i = int(math.floor(t / tiles[kind] * side)) & (side - 1)
-            j = int(math.floor(s / tiles[kind] * side)) & (side - 1)
+            i = math.floor(t / tiles[kind] * side) & (side - 1)
+            j = math.floor(s / tiles[kind] * side) & (side - 1)
             texel = starts[kind, level] + i * side + j
             red, green, blue = ambient[0], ambient[1], ambient[2]
             for lamp in range(len(directions)):

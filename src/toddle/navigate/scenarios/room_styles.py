@@ -47,9 +47,9 @@ RANGES: dict[Style, Ranges] = {
         furniture=("plain", "cloudy", "planks", "checks"),
         hues=((0.07, 0.16), (0.50, 0.68)),
         saturation=(0.02, 0.35),
-        ambient=(0.40, 0.62),
+        ambient=(0.48, 0.72),
         lamps=(0.30, 0.60),
-        grain=(0.03, 0.12),
+        grain=(0.02, 0.10),
     ),
     "unseen": Ranges(
         walls=("bricks", "waves"),
@@ -57,7 +57,7 @@ RANGES: dict[Style, Ranges] = {
         furniture=("dots", "waves"),
         hues=((0.22, 0.42), (0.72, 0.86)),
         saturation=(0.12, 0.45),
-        ambient=(0.24, 0.38),
+        ambient=(0.30, 0.44),
         lamps=(0.35, 0.80),
         grain=(0.03, 0.12),
     ),
@@ -90,10 +90,10 @@ def surfaces(draw: np.random.Generator, style: Style) -> tuple[Surface, ...]:
     some = [_coloured(draw, ranges, ranges.furniture, (0.25, 0.85), (0.3, 0.8)) for _ in range(FURNITURE_SURFACES)]
     worn = [_coloured(draw, ranges, ranges.furniture, (0.15, 0.8), (0.2, 0.5)) for _ in range(CLOTHES_SURFACES)]
     return (
-        _coloured(draw, ranges, ranges.floors, (0.35, 0.8), (0.6, 1.6)),
+        _coloured(draw, ranges, ranges.floors, (0.45, 0.85), (0.6, 1.6)),
         _fixed(draw, (0.0, 1.0), (0.0, 0.04), (0.85, 0.95)),
         _coloured(draw, ranges, ranges.walls, (0.6, 0.95), (0.8, 2.4)),
-        _coloured(draw, ranges, ranges.walls, (0.45, 0.95), (0.8, 2.4)),
+        _coloured(draw, ranges, ranges.walls, (0.55, 0.95), (0.8, 2.4)),
         _fixed(draw, RED, (0.80, 0.95), (0.62, 0.85), grain=0.03),
         _fixed(draw, (0.0, 1.0), (0.0, 0.1), (0.06, 0.14)),
         _fixed(draw, (0.10, 0.16), (0.0, 0.25), (0.8, 0.95), pattern="checks", tile=0.1),
@@ -135,7 +135,7 @@ def _coloured(
 ) -> Surface:
     low, high = ranges.hues[int(draw.integers(len(ranges.hues)))]
     hue, saturation, bright = draw.uniform(low, high), draw.uniform(*ranges.saturation), draw.uniform(*value)
-    second = _rgb(draw.uniform(low, high), draw.uniform(*ranges.saturation), bright * draw.uniform(0.55, 0.9))
+    second = _rgb(draw.uniform(low, high), draw.uniform(*ranges.saturation), bright * draw.uniform(0.65, 0.92))
     return Surface(
         str(draw.choice(patterns)),
         _rgb(hue, saturation, bright),

@@ -190,7 +190,7 @@ class Room:
         people: who else is there.
         surfaces: of everything.
         light: in the room.
-        shortest: length of the way for a disc of radius `draw_rooms.BODY` to within `SUCCESS_RADIUS`, people left out [m].
+        shortest: length of the way to within `SUCCESS_RADIUS` for a disc of `draw_rooms.BODY`, people left out [m].
     """
 
     scenario: Scenario

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -84,14 +85,24 @@ class HumanoidSimulation:
         touched: whether feet, legs, body have touched an obstacle since the last `reset`.
     """
 
-    def __init__(self, humanoid: Humanoid, options: WorldOptions | None = None) -> None:
+    def __init__(
+        self,
+        humanoid: Humanoid,
+        options: WorldOptions | None = None,
+        furnish: Callable[[Any], None] | None = None,
+    ) -> None:
         """Builds the world and stands the robot at home.
+
+        Args:
+            humanoid: the robot.
+            options: the world; None: a level floor.
+            furnish: adds to the world's description what else there is: see `rooms`.
 
         Raises:
             BadInput: the humanoid's description lacks something, or its servos are not its joints.
         """
         self.humanoid, self.options = humanoid, options or WorldOptions()
-        self.model = build(humanoid, self.options)
+        self.model = build(humanoid, self.options, furnish)
         joints = len(humanoid.joints)
         if self.model.nu != joints or self.model.nq != 7 + joints:
             raise BadInput(
@@ -102,7 +113,7 @@ class HumanoidSimulation:
         self.data = mujoco.MjData(self.model)
         self._organs = organs(humanoid, self.model, self.options)
         disturb_masses(self.model, self.options)
-        self._shapes = shapes(self.model, len(self.options.circles))
+        self._shapes = shapes(self.model)
         self._chest = int(self.model.site_bodyid[site(humanoid, self.model, "chest")])
         self._soles = [site(humanoid, self.model, name) for name in ("left_sole", "right_sole")]
         self._root = int(self.model.body_rootid[self._chest])
@@ -154,7 +165,7 @@ class HumanoidSimulation:
             self._press()
         t, q, v = self._steps()
         self._felt.append(sense(self._organs, self._vectors, self.data, t, q, v, self.options, self._draw))
-        if self.options.circles:
+        if self._shapes.obstacles:
             self.touched |= touching(self._shapes, self.data)
         return self._felt[0]
 
@@ -206,7 +217,7 @@ class HumanoidSimulation:
         turned = data.site_xmat[self._soles]
         yaws = np.arctan2(turned[:, 3], turned[:, 0])
         force = np.abs(data.qfrc_actuator[6:])
-        near = bool(self.options.circles)
+        near = bool(self._shapes.obstacles)
         return Truth(
             float(data.time),
             data.qpos.copy(),

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from toddle.outside.simulation.world import OBSTACLE, SOLES
+from toddle.outside.simulation.world import OBSTACLE_BIT, SOLES
 
 FEET, LEGS, BODY = 0, 1, 2
 _NONE = -1
@@ -31,7 +31,7 @@ class Shapes(NamedTuple):
     obstacles: tuple[int, ...]
 
 
-def shapes(model: mujoco.MjModel, obstacles: int) -> Shapes:
+def shapes(model: mujoco.MjModel) -> Shapes:
     """Sorts a model's geoms: a foot is all that is rigid with a sole, a leg what is between it and the waist."""
     rigid = model.body_weldid
     feet = {int(rigid[model.site_bodyid[model.site(name).id]]) for name in SOLES}
@@ -43,8 +43,7 @@ def shapes(model: mujoco.MjModel, obstacles: int) -> Shapes:
     for geom in np.flatnonzero(solid & theirs).tolist():
         body = int(rigid[model.geom_bodyid[geom]])
         part[geom] = FEET if body in feet else LEGS if body in legs else BODY
-    obstacle = np.zeros(model.ngeom, bool)
-    obstacle[[model.geom(OBSTACLE.format(number)).id for number in range(obstacles)]] = True
+    obstacle = (model.geom_contype & OBSTACLE_BIT) != 0
     robot = tuple(np.flatnonzero(part != _NONE).tolist())
     return Shapes(part, obstacle, robot, tuple(np.flatnonzero(obstacle).tolist()))
 
@@ -63,15 +62,22 @@ def clearances(shapes: Shapes, model: mujoco.MjModel, data: mujoco.MjData) -> Fl
     """Distance of feet, legs and body to the nearest obstacle [m], at most 1; under 0 they overlap."""
     nearest = np.full(3, _FAR)
     for obstacle in shapes.obstacles:
-        radius = model.geom_size[obstacle, 0]
-        away = np.linalg.norm(data.geom_xpos[:, :2] - data.geom_xpos[obstacle, :2], axis=1)
-        bound = away - radius - model.geom_rbound
+        bound = _away(model, data, obstacle) - model.geom_rbound
         for geom in shapes.robot:
             part = shapes.part[geom]
             if bound[geom] < nearest[part]:
                 distance = mujoco.mj_geomDistance(model, data, geom, obstacle, nearest[part], None)
                 nearest[part] = min(nearest[part], distance)
     return nearest
+
+
+def _away(model: mujoco.MjModel, data: mujoco.MjData, obstacle: int) -> Float[np.ndarray, " geoms"]:
+    """Level distance of each geom's middle to an upright cylinder or box [m]; for a cylinder, negative inside."""
+    off = data.geom_xpos[:, :2] - data.geom_xpos[obstacle, :2]
+    if model.geom_type[obstacle] == mujoco.mjtGeom.mjGEOM_BOX:
+        turn = data.geom_xmat[obstacle].reshape(3, 3)[:2, :2]
+        return np.linalg.norm(np.maximum(np.abs(off @ turn) - model.geom_size[obstacle, :2], 0.0), axis=1)
+    return np.linalg.norm(off, axis=1) - model.geom_size[obstacle, 0]
 
 
 def _upwards(model: mujoco.MjModel, body: int) -> list[int]:

@@ -7,6 +7,7 @@ an obstacle stops soles and shells.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -20,17 +21,18 @@ from toddle.robots.humanoid import Humanoid
 GRAVITY = 9.81  # [m/s^2]
 SOLES = ("left_sole", "right_sole")
 OBSTACLE = "obstacle{}"
-_GROUND, _OBSTACLE = 1, 2  # bits of what collides
+_GROUND, OBSTACLE_BIT = 1, 2  # bits of what collides
 _TALL = 1.5  # of an obstacle [m]
 _START = 0.3  # no bump lies nearer to the start [m]
 
 
-def build(humanoid: Humanoid, options: WorldOptions) -> mujoco.MjModel:
+def build(humanoid: Humanoid, options: WorldOptions, furnish: Callable[[Any], None] | None = None) -> mujoco.MjModel:
     """The humanoid on its floor, among the obstacles.
 
     Args:
         humanoid: its ``spec`` is copied, not changed.
         options: the world.
+        furnish: adds to the description (an MjSpec) what else there is; what is to be touched has contype 3.
 
     Raises:
         BadInput: the description lacks something that a humanoid's must have.
@@ -51,6 +53,8 @@ def build(humanoid: Humanoid, options: WorldOptions) -> mujoco.MjModel:
     _bumps(spec, options, np.random.default_rng([options.seed, 0]))
     _obstacles(spec, options)
     _slow_servos(spec, options)
+    if furnish is not None:
+        furnish(spec)
     return spec.compile()
 
 
@@ -121,7 +125,7 @@ def _obstacles(spec: Any, options: WorldOptions) -> None:
             name=OBSTACLE.format(number),
             type=mujoco.mjtGeom.mjGEOM_CYLINDER,
             size=[circle.radius, _TALL / 2, 0.0],
-            contype=_GROUND | _OBSTACLE,
+            contype=_GROUND | OBSTACLE_BIT,
             conaffinity=0,
             rgba=[0.80, 0.36, 0.28, 1.0],
         )
