@@ -15,7 +15,7 @@ from jaxtyping import Float, Float32, Int, UInt8
 
 from toddle.geometry.camera import Pinhole, RectifiedCameras
 from toddle.navigate.scenarios import raycast_kernels
-from toddle.navigate.scenarios.rooms import Room, solids
+from toddle.navigate.scenarios.rooms import Hall, Room, Solids, moved, solids
 from toddle.navigate.scenarios.textures import texture
 
 CHEST_CAMERAS = RectifiedCameras(Pinhole(320, 240, 236.0, 236.0, 160.0, 120.0), 0.068)
@@ -89,6 +89,7 @@ class RayCaster:
 
     Attributes:
         room: which.
+        parts: all that is in it, people where they start.
         texels: of all levels of all textures.
         starts: the first texel of each level of each texture.
         sizes: side of each level [texels].
@@ -96,6 +97,7 @@ class RayCaster:
     """
 
     room: Room
+    parts: Solids
     texels: UInt8[np.ndarray, "texels 3"]
     starts: Int[np.ndarray, "surfaces levels"]
     sizes: Int[np.ndarray, " levels"]
@@ -109,8 +111,8 @@ class RayCaster:
             camera: how it looks; it bends nothing.
             people: where they are [m]; None: where they start.
         """
-        parts, light = solids(self.room, people), self.room.light
-        depth, solid = _cast(self.room, eye, camera, people)
+        parts, light = self.parts if people is None else moved(self.parts, self.room, people), self.room.light
+        depth, solid = _cast(parts, self.room.hall, eye, camera)
         picture = np.empty((*depth.shape, 3), np.uint8)
         raycast_kernels.shade(
             parts.middle, parts.half, parts.yaw, parts.round, parts.surface, eye.position, eye.axes,
@@ -133,22 +135,23 @@ def ray_caster(room: Room) -> RayCaster:
             at += size * size
     table = np.array(starts, np.int32).reshape(len(room.surfaces), len(sizes))
     tiles = np.array([surface.tile for surface in room.surfaces])
-    return RayCaster(room, np.concatenate(levels), table, np.array(sizes, np.int32), tiles)
+    return RayCaster(room, solids(room), np.concatenate(levels), table, np.array(sizes, np.int32), tiles)
 
 
 def seen_things(room: Room, eye: Eye, camera: Pinhole = SMALL) -> Int[np.ndarray, "rows columns"]:
     """Which thing each pixel shows, without its colour: 0 is the target."""
-    return solids(room).thing[_cast(room, eye, camera, None)[1]]
+    parts = solids(room)
+    return parts.thing[_cast(parts, room.hall, eye, camera)[1]]
 
 
 def _cast(
-    room: Room, eye: Eye, camera: Pinhole, people: Float[np.ndarray, "people 2"] | None
+    parts: Solids, hall: Hall, eye: Eye, camera: Pinhole
 ) -> tuple[Float32[np.ndarray, "rows columns"], Int[np.ndarray, "rows columns"]]:
-    parts = solids(room, people)
     depth = np.empty((camera.height, camera.width), np.float32)
     solid = np.empty((camera.height, camera.width), np.int32)
+    within = np.array([hall.x, hall.y, hall.yaw, *hall.half, hall.height])
     raycast_kernels.cast(
-        parts.middle, parts.half, parts.yaw, parts.round, eye.position, eye.axes,
+        parts.middle, parts.half, parts.yaw, parts.round, within, eye.position, eye.axes,
         camera.fx, camera.fy, camera.cx, camera.cy, depth, solid,
     )  # fmt: skip
     return depth, solid

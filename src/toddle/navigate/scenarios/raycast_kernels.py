@@ -13,7 +13,7 @@ from numba import njit
 
 FAR = 1e6
 NEAR = 0.02
-_EPS = 1e-9
+_TINY = 1e-12
 
 
 @njit(cache=True, fastmath=True)
@@ -45,81 +45,137 @@ def _span(middle, half, cos, sin, position, axes, fx, fy, cx, cy, rows, columns)
 
 
 @njit(cache=True, fastmath=True)
-def _inverse(value):
-    return 1.0 / value if abs(value) > _EPS else (1.0 / _EPS if value >= 0 else -1.0 / _EPS)
+def _box_row(a0, a1, b0, b1, c0, c1, oa, ob, oc, ha, hb, hc, xs, left, right, number, depth, solid):
+    """One row of a box: along each of its axes a ray is ``0 + x 1``, from the origin o."""
+    for column in range(left, right + 1):
+        x = xs[column]
+        ia, ib, ic = 1.0 / (a0 + x * a1 + _TINY), 1.0 / (b0 + x * b1 + _TINY), 1.0 / (c0 + x * c1 + _TINY)
+        ra, rb, rc = ha * abs(ia), hb * abs(ib), hc * abs(ic)
+        ma, mb, mc = -oa * ia, -ob * ib, -oc * ic
+        enter, leave = max(ma - ra, mb - rb, mc - rc), min(ma + ra, mb + rb, mc + rc)
+        nearest = (enter <= leave) & (enter > NEAR) & (enter < depth[column])
+        depth[column] = enter if nearest else depth[column]
+        solid[column] = number if nearest else solid[column]
 
 
 @njit(cache=True, fastmath=True)
-def _box(origin, ray, half):
-    """Depth at which a ray enters a box; FAR: it doesn't, or starts in it."""
-    enter, leave = NEAR, FAR
-    for axis in range(3):
-        inverse = _inverse(ray[axis])
-        middle, reach = -origin[axis] * inverse, half[axis] * abs(inverse)
-        enter, leave = max(enter, middle - reach), min(leave, middle + reach)
-    return enter if NEAR < enter <= leave else FAR
+def _cylinder_row(a0, a1, b0, b1, c0, c1, oa, ob, oc, ha, hc, xs, left, right, number, depth, solid):
+    """One row of an upright cylinder, in the same way."""
+    c = oa * oa + ob * ob - ha * ha
+    for column in range(left, right + 1):
+        x = xs[column]
+        ra, rb = a0 + x * a1, b0 + x * b1
+        a, b = ra * ra + rb * rb + _TINY, oa * ra + ob * rb
+        square = b * b - a * c
+        root, ic = math.sqrt(max(square, 0.0)), 1.0 / (c0 + x * c1 + _TINY)
+        mc, rc = -oc * ic, hc * abs(ic)
+        enter, leave = max((-b - root) / a, mc - rc), min((root - b) / a, mc + rc)
+        nearest = (square > 0.0) & (enter <= leave) & (enter > NEAR) & (enter < depth[column])
+        depth[column] = enter if nearest else depth[column]
+        solid[column] = number if nearest else solid[column]
 
 
 @njit(cache=True, fastmath=True)
-def _cylinder(origin, ray, half):
-    """Depth at which a ray enters an upright cylinder; FAR: it doesn't, or starts in it."""
-    a = ray[0] * ray[0] + ray[1] * ray[1]
-    b = origin[0] * ray[0] + origin[1] * ray[1]
-    c = origin[0] * origin[0] + origin[1] * origin[1] - half[0] * half[0]
-    enter, leave = NEAR, FAR
-    if a > _EPS:
-        root = b * b - a * c
-        if root < 0:
-            return FAR
-        root = math.sqrt(root)
-        enter, leave = max(enter, (-b - root) / a), (root - b) / a
-    elif c > 0:
-        return FAR
-    inverse = _inverse(ray[2])
-    middle, reach = -origin[2] * inverse, half[2] * abs(inverse)
-    enter, leave = max(enter, middle - reach), min(leave, middle + reach)
-    return enter if NEAR < enter <= leave else FAR
+def _hall_row(a0, a1, b0, b1, c0, c1, oa, ob, oc, ha, hb, hc, xs, first, depth, solid):
+    """One row of the hall, seen from inside; its slabs are solids: floor, ceiling, +x, -x, +y, -y."""
+    for column in range(len(xs)):
+        x = xs[column]
+        ra, rb, rc = a0 + x * a1 + _TINY, b0 + x * b1 + _TINY, c0 + x * c1 + _TINY
+        ta = ((ha if ra > 0 else -ha) - oa) / ra
+        tb = ((hb if rb > 0 else -hb) - ob) / rb
+        tc = ((hc if rc > 0 else -hc) - oc) / rc
+        far = min(ta, tb, tc)
+        depth[column] = far
+        upright = (2 if ra > 0 else 3) if ta <= tb else (4 if rb > 0 else 5)
+        solid[column] = first + ((1 if rc > 0 else 0) if tc <= far else upright)
 
 
 @njit(cache=True, fastmath=True)
-def cast(middle, half, yaw, rounds, position, axes, fx, fy, cx, cy, depth, solid):
+def cast(middle, half, yaw, rounds, hall, position, axes, fx, fy, cx, cy, depth, solid):
     """The nearest solid at each pixel.
 
     Args:
-        middle, half, yaw, rounds: of each solid.
+        middle, half, yaw, rounds: of each solid; the last six are the hall's slabs.
+        hall: x, y, yaw, half length, half width, height of the room within them.
         position, axes: of the camera; columns of the axes: its x, y, z.
         fx, fy, cx, cy: of the camera [pixels].
         depth: written [m]; FAR where there is nothing.
         solid: written; -1 where there is nothing.
     """
     rows, columns = depth.shape
-    depth[:] = FAR
-    solid[:] = -1
-    origin, first, across, down, ray = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    for number in range(len(yaw)):
+    xs = (np.arange(columns) - cx) / fx
+    cos, sin = math.cos(hall[2]), math.sin(hall[2])
+    oa, ob, oc, t = _into(cos, sin, position[0] - hall[0], position[1] - hall[1], position[2] - hall[5] / 2, axes)
+    count = len(yaw)
+    if abs(oa) < hall[3] and abs(ob) < hall[4] and abs(oc) < hall[5] / 2:
+        count -= 6
+        for row in range(rows):
+            y = (row - cy) / fy
+            _hall_row(
+                t[0, 2] + y * t[0, 1], t[0, 0], t[1, 2] + y * t[1, 1], t[1, 0], t[2, 2] + y * t[2, 1], t[2, 0],
+                oa, ob, oc, hall[3], hall[4], hall[5] / 2, xs, count, depth[row], solid[row],
+            )  # fmt: skip
+    else:
+        depth[:] = FAR
+        solid[:] = -1
+    for number in range(count):
+        m, h = middle[number], half[number]
         cos, sin = math.cos(yaw[number]), math.sin(yaw[number])
-        top, bottom, left, right = _span(
-            middle[number], half[number], cos, sin, position, axes, fx, fy, cx, cy, rows, columns
-        )
+        top, bottom, left, right = _span(m, h, cos, sin, position, axes, fx, fy, cx, cy, rows, columns)
         if bottom < top or right < left:
             continue
-        dx, dy = position[0] - middle[number, 0], position[1] - middle[number, 1]
-        origin[0], origin[1] = cos * dx + sin * dy, cos * dy - sin * dx
-        origin[2] = position[2] - middle[number, 2]
-        for axis, into in ((0, across), (1, down), (2, first)):
-            into[0] = cos * axes[0, axis] + sin * axes[1, axis]
-            into[1] = cos * axes[1, axis] - sin * axes[0, axis]
-            into[2] = axes[2, axis]
+        oa, ob, oc, t = _into(cos, sin, position[0] - m[0], position[1] - m[1], position[2] - m[2], axes)
         for row in range(top, bottom + 1):
             y = (row - cy) / fy
-            for column in range(left, right + 1):
-                x = (column - cx) / fx
-                for axis in range(3):
-                    ray[axis] = first[axis] + x * across[axis] + y * down[axis]
-                far = _cylinder(origin, ray, half[number]) if rounds[number] else _box(origin, ray, half[number])
-                if far < depth[row, column]:
-                    depth[row, column] = far
-                    solid[row, column] = number
+            a0, b0, c0 = t[0, 2] + y * t[0, 1], t[1, 2] + y * t[1, 1], t[2, 2] + y * t[2, 1]
+            if rounds[number]:
+                _cylinder_row(
+                    a0, t[0, 0], b0, t[1, 0], c0, t[2, 0], oa, ob, oc, h[0], h[2],
+                    xs, left, right, number, depth[row], solid[row],
+                )  # fmt: skip
+            else:
+                _box_row(
+                    a0, t[0, 0], b0, t[1, 0], c0, t[2, 0], oa, ob, oc, h[0], h[1], h[2],
+                    xs, left, right, number, depth[row], solid[row],
+                )  # fmt: skip
+
+
+@njit(cache=True, fastmath=True)
+def _into(cos, sin, x, y, z, axes):
+    """A camera in the frame of something turned by a yaw: its place there, and its axes."""
+    turned = np.empty((3, 3))
+    for axis in range(3):
+        turned[0, axis] = cos * axes[0, axis] + sin * axes[1, axis]
+        turned[1, axis] = cos * axes[1, axis] - sin * axes[0, axis]
+        turned[2, axis] = axes[2, axis]
+    return cos * x + sin * y, cos * y - sin * x, z, turned
+
+
+@njit(cache=True, fastmath=True)
+def _lit(nx, ny, nz, ambient, directions, colours, light):
+    """The light on a surface, by its normal."""
+    for channel in range(3):
+        light[channel] = ambient[channel]
+    for lamp in range(len(directions)):
+        facing = -(nx * directions[lamp, 0] + ny * directions[lamp, 1] + nz * directions[lamp, 2])
+        if facing > 0:
+            for channel in range(3):
+                light[channel] += facing * colours[lamp, channel]
+
+
+@njit(cache=True, fastmath=True)
+def lights(yaw, ambient, directions, colours):
+    """The light on the faces of boxes: +x, -x, +y, -y of their own frame, above, below."""
+    found = np.empty((len(yaw), 6, 3))
+    for number in range(len(yaw)):
+        cos, sin = math.cos(yaw[number]), math.sin(yaw[number])
+        _lit(cos, sin, 0.0, ambient, directions, colours, found[number, 0])
+        _lit(-cos, -sin, 0.0, ambient, directions, colours, found[number, 1])
+        _lit(-sin, cos, 0.0, ambient, directions, colours, found[number, 2])
+        _lit(sin, -cos, 0.0, ambient, directions, colours, found[number, 3])
+        _lit(0.0, 0.0, 1.0, ambient, directions, colours, found[number, 4])
+        _lit(0.0, 0.0, -1.0, ambient, directions, colours, found[number, 5])
+    return found
 
 
 @njit(cache=True, fastmath=True)
@@ -141,13 +197,16 @@ def shade(
         picture: written.
     """
     rows, columns = depth.shape
+    faces, side_light = lights(yaw, ambient, directions, colours), np.empty(3)
+    turns = np.empty((len(yaw), 2))
+    for number in range(len(yaw)):
+        turns[number, 0], turns[number, 1] = math.cos(yaw[number]), math.sin(yaw[number])
     for row in range(rows):
         y = (row - cy) / fy
         for column in range(columns):
             number = solid[row, column]
             if number < 0:
-                for channel in range(3):
-                    picture[row, column, channel] = 0
+                picture[row, column] = 0
                 continue
             x, far = (column - cx) / fx, depth[row, column]
             rx = axes[0, 2] + x * axes[0, 0] + y * axes[0, 1]
@@ -155,45 +214,30 @@ def shade(
             rz = axes[2, 2] + x * axes[2, 0] + y * axes[2, 1]
             dx = position[0] + far * rx - middle[number, 0]
             dy = position[1] + far * ry - middle[number, 1]
-            cos, sin = math.cos(yaw[number]), math.sin(yaw[number])
+            cos, sin = turns[number, 0], turns[number, 1]
             a, b, c = cos * dx + sin * dy, cos * dy - sin * dx, position[2] + far * rz - middle[number, 2]
-            ha, hb, hc = half[number, 0], half[number, 1], half[number, 2]
-            na, nb, nc = 0.0, 0.0, 0.0
+            over_a, over_b = abs(a) - half[number, 0], abs(b) - half[number, 1]
+            over_c = abs(c) - half[number, 2]
             if rounds[number]:
                 reach = math.sqrt(a * a + b * b)
-                if reach - ha > abs(c) - hc:
-                    na, nb = a / reach, b / reach
-                    s, t = math.atan2(b, a) * ha, c
-                else:
-                    nc = 1.0 if c > 0 else -1.0
-                    s, t = a, b
-            elif abs(a) - ha > max(abs(b) - hb, abs(c) - hc):
-                na = 1.0 if a > 0 else -1.0
-                s, t = b, c
-            elif abs(b) - hb > abs(c) - hc:
-                nb = 1.0 if b > 0 else -1.0
-                s, t = a, c
+                over_a, over_b = reach - half[number, 0], -1.0
+            if over_c >= max(over_a, over_b):
+                light, facing, s, t = faces[number, 4 if c > 0 else 5], abs(rz), a, b
+            elif rounds[number]:
+                nx, ny = (cos * a - sin * b) / reach, (sin * a + cos * b) / reach
+                _lit(nx, ny, 0.0, ambient, directions, colours, side_light)
+                light, facing, s, t = side_light, abs(nx * rx + ny * ry), math.atan2(b, a) * half[number, 0], c
+            elif over_a >= over_b:
+                light, facing, s, t = faces[number, 0 if a > 0 else 1], abs(cos * rx + sin * ry), b, c
             else:
-                nc = 1.0 if c > 0 else -1.0
-                s, t = a, b
-            nx, ny = cos * na - sin * nb, sin * na + cos * nb
+                light, facing, s, t = faces[number, 2 if b > 0 else 3], abs(cos * ry - sin * rx), a, c
             kind = surface[number]
-            facing = abs(nx * rx + ny * ry + nc * rz) / math.sqrt(rx * rx + ry * ry + rz * rz)
-            width = far / fx / max(facing, 0.15)  # of the pixel, on the surface
+            width = 0.75 * far / fx / max(facing, 0.15)  # of the pixel, on the surface
             level, fine = 0, tiles[kind] / sizes[0]
-            while fine < 0.75 * width and level < len(sizes) - 1:
+            while fine < width and level < len(sizes) - 1:
                 level, fine = level + 1, 2 * fine
-            side = sizes[level]
-            i = math.floor(t / tiles[kind] * side) & (side - 1)
-            j = math.floor(s / tiles[kind] * side) & (side - 1)
-            texel = starts[kind, level] + i * side + j
-            red, green, blue = ambient[0], ambient[1], ambient[2]
-            for lamp in range(len(directions)):
-                lit = -(nx * directions[lamp, 0] + ny * directions[lamp, 1] + nc * directions[lamp, 2])
-                if lit > 0:
-                    red += lit * colours[lamp, 0]
-                    green += lit * colours[lamp, 1]
-                    blue += lit * colours[lamp, 2]
-            picture[row, column, 0] = min(255.0, texels[texel, 0] * red + 0.5)
-            picture[row, column, 1] = min(255.0, texels[texel, 1] * green + 0.5)
-            picture[row, column, 2] = min(255.0, texels[texel, 2] * blue + 0.5)
+            size, scale = sizes[level], 1.0 / fine
+            i, j = math.floor(t * scale) & (size - 1), math.floor(s * scale) & (size - 1)
+            texel = starts[kind, level] + i * size + j
+            for channel in range(3):
+                picture[row, column, channel] = min(255.0, texels[texel, channel] * light[channel] + 0.5)

@@ -235,25 +235,31 @@ def hall_parts(hall: Hall) -> tuple[Part, ...]:
     return tuple(Part("box", middle, size, surface) for middle, size, surface in slabs)
 
 
-def solids(room: Room, people: Float[np.ndarray, "people 2"] | None = None) -> Solids:
-    """All that is in a room, as arrays.
-
-    Args:
-        room: which.
-        people: where they are [m]; None: where they start.
-    """
+def solids(room: Room) -> Solids:
+    """All that is in a room, as arrays; people where they start."""
     hall = Thing("hall", room.hall.x, room.hall.y, room.hall.yaw, math.inf, hall_parts(room.hall))
-    walkers = [person.looks for person in room.people]
-    places = [(thing.x, thing.y) for thing in walkers] if people is None else [(x, y) for x, y in people.tolist()]
-    every = [(thing, thing.x, thing.y) for thing in room.standing]
-    every += [(thing, x, y) for thing, (x, y) in zip(walkers, places, strict=True)] + [(hall, hall.x, hall.y)]
     rows = []
-    for number, (thing, x, y) in enumerate(every):
+    for number, thing in enumerate((*room.standing, *(person.looks for person in room.people), hall)):
         cos, sin = math.cos(thing.yaw), math.sin(thing.yaw)
         for part in thing.parts:
             a, b, z = part.middle
-            middle = (x + cos * a - sin * b, y + sin * a + cos * b, z)
+            middle = (thing.x + cos * a - sin * b, thing.y + sin * a + cos * b, z)
             rows.append((*middle, *part.half, thing.yaw, part.shape == "cylinder", part.surface, number))
     table = np.array(rows, float)
     whole = table[:, 7:].astype(np.int32)
-    return Solids(table[:, :3], table[:, 3:6], table[:, 6], whole[:, 0], whole[:, 1], whole[:, 2])
+    arrays = (table[:, :3], table[:, 3:6], table[:, 6], whole[:, 0], whole[:, 1], whole[:, 2])
+    return Solids(*map(np.ascontiguousarray, arrays))
+
+
+def moved(parts: Solids, room: Room, people: Float[np.ndarray, "people 2"]) -> Solids:
+    """The same solids with the people somewhere else.
+
+    Args:
+        parts: as `solids` gives them.
+        room: likewise.
+        people: where each is [m].
+    """
+    shift = np.zeros((len(room.standing) + len(room.people) + 1, 3))
+    starts = np.array([[person.looks.x, person.looks.y] for person in room.people]).reshape(-1, 2)
+    shift[len(room.standing) : -1, :2] = people - starts
+    return parts._replace(middle=parts.middle + shift[parts.thing])
