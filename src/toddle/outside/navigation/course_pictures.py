@@ -67,6 +67,7 @@ def cases(
         ended = f"{finish.outcome.name.lower()} after {finish.seconds:.1f} s"
         axes.set_title(f"({chr(ord('a') + number)}) {ended}, {finish.length:.2f} m", fontsize=10)
         _square(axes, _shown(course, finish))
+        axes.locator_params(nbins=6)
     figure.suptitle(title)
     save_figure(figure, path)
 
