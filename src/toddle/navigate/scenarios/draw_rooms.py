@@ -43,7 +43,10 @@ _PLACES = 60  # draws of one thing's place
 _APART = 0.1  # between two things [m]
 _FROM_START, _FROM_TARGET, _FROM_WAY = 0.65, 0.60, 0.45  # to a thing's rim [m]
 _FROM_WALL = 0.9  # of start and target [m]
+_FROM_PANEL = 0.05  # of a thing to the walls, on which panels are [m]
 _BYSTANDER = 0.3  # share of rooms
+_PANEL_SURFACES = tuple(map(room_styles.furniture_surface, range(room_styles.FURNITURE_SURFACES)))
+_PANEL_SURFACES += (room_styles.CEILING, room_styles.METAL)
 _Point = Float[np.ndarray, "2"]
 
 
@@ -132,10 +135,11 @@ def _hall(draw: np.random.Generator, end: _Point) -> Hall | None:
     """A hall that holds start and target."""
     half = draw.uniform(2.0, 4.2), draw.uniform(1.8, 3.2)
     yaw, height = draw.uniform(-math.pi, math.pi), draw.uniform(2.4, 3.2)
+    panels = furniture.panels(draw, half, _PANEL_SURFACES)
     walls = draw.choice([room_styles.WALL, room_styles.WALL, room_styles.ACCENT], 4).tolist()
     for _ in range(_PLACES):
         x, y = (end / 2 + draw.uniform(-3.0, 3.0, 2)).tolist()
-        hall = Hall(x, y, yaw, half, height, room_styles.FLOOR, room_styles.CEILING, tuple(walls))
+        hall = Hall(x, y, yaw, half, height, room_styles.FLOOR, room_styles.CEILING, tuple(walls), panels)
         if hall.inside(np.stack([np.zeros(2), end])).min() >= _FROM_WALL:
             return hall
     return None
@@ -242,7 +246,7 @@ def _somewhere(draw: np.random.Generator, hall: Hall) -> _Point:
 def _fits(thing: Thing, hall: Hall, end: _Point, others: list[Thing]) -> bool:
     place = np.array([thing.x, thing.y])
     return bool(
-        hall.inside(place) >= thing.radius + 0.02
+        hall.inside(place) >= thing.radius + _FROM_PANEL
         and np.hypot(*place) >= thing.radius + _FROM_START
         and np.hypot(*(place - end)) >= thing.radius + _FROM_TARGET
         and all(math.dist(place, (it.x, it.y)) >= thing.radius + it.radius + _APART for it in others)

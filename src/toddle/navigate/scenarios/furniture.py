@@ -20,6 +20,10 @@ Maker = Callable[[np.random.Generator, tuple[int, ...]], tuple[Part, ...]]
 PERSON_RADIUS = 0.25
 """Of the circle that a person takes [m]."""
 
+_SLOT = 1.5  # of a wall, for one panel at most [m]
+_THIN = 0.03  # of a panel [m]
+_PANELS = ((0.9, 0.0, 2.0), (1.2, 0.9, 2.0), (0.6, 0.8, 1.6), (1.0, 0.1, 0.7), (0.8, 0.3, 0.9), (1.2, 0.0, 0.1))
+
 
 def stand(kind: str, parts: tuple[Part, ...], place: Float[np.ndarray, "2"], yaw: float) -> Thing:
     """A thing at its place [m], turned by yaw [rad]."""
@@ -161,6 +165,29 @@ OBSTACLES: tuple[str, ...] = ("chair", "office chair", "carton", "cartons", "bin
 
 DECOYS: dict[str, Maker] = {"bin": _bin, "carton": _carton, "chair": _chair, "pole": _pole, "bag": _bag}
 """What may have the target's colour, but not its shape."""
+
+
+def panels(draw: np.random.Generator, half: tuple[float, float], surfaces: tuple[int, ...]) -> tuple[Part, ...]:
+    """Doors, windows, posters, radiators on the four walls of a hall, in its frame; about half of the wall is bare.
+
+    Args:
+        draw: random.
+        half: half of the hall's length and width [m].
+        surfaces: those that they may have.
+    """
+    found = []
+    for wall in range(4):
+        along, off, side = half[1 - wall // 2], half[wall // 2], 1.0 - 2.0 * (wall % 2)
+        slots = int(2 * along / _SLOT)
+        for slot in range(slots):
+            wide, low, high = _PANELS[int(draw.integers(len(_PANELS)))]
+            at = (slot + 0.5) * 2 * along / slots - along + draw.uniform(-0.1, 0.1)
+            surface = surfaces[int(draw.integers(len(surfaces)))]
+            if draw.random() < 0.5:
+                continue
+            place, thin = side * (off - _THIN / 2), (_THIN, wide) if wall < 2 else (wide, _THIN)
+            found.append(_box((place, at) if wall < 2 else (at, place), low, high, *thin, surface))
+    return tuple(found)
 
 
 def _box(at: tuple[float, float], low: float, high: float, along: float, across: float, surface: int) -> Part:

@@ -153,14 +153,14 @@ def _into(cos, sin, x, y, z, axes):
 
 @njit(cache=True, fastmath=True)
 def _lit(nx, ny, nz, ambient, directions, colours, light):
-    """The light on a surface, by its normal."""
+    """The light on a surface, by its normal; at most 1, as OpenGL has it."""
     for channel in range(3):
         light[channel] = ambient[channel]
     for lamp in range(len(directions)):
         facing = -(nx * directions[lamp, 0] + ny * directions[lamp, 1] + nz * directions[lamp, 2])
         if facing > 0:
             for channel in range(3):
-                light[channel] += facing * colours[lamp, channel]
+                light[channel] = min(light[channel] + facing * colours[lamp, channel], 1.0)
 
 
 @njit(cache=True, fastmath=True)
@@ -240,4 +240,4 @@ def shade(
             i, j = math.floor(t * scale) & (size - 1), math.floor(s * scale) & (size - 1)
             texel = starts[kind, level] + i * size + j
             for channel in range(3):
-                picture[row, column, channel] = min(255.0, texels[texel, channel] * light[channel] + 0.5)
+                picture[row, column, channel] = texels[texel, channel] * light[channel] + 0.5

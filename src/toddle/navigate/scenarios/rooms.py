@@ -111,7 +111,7 @@ class Person:
 
 @dataclass(frozen=True)
 class Light:
-    """Light without place: a lit surface is ``ambient + sum(colour max(0, -normal direction))`` times its texture.
+    """Light without place: a lit surface is ``ambient + sum(colour max(0, -normal direction))``, at most 1, times its texture.
 
     Attributes:
         ambient: from everywhere.
@@ -137,6 +137,7 @@ class Hall:
         floor: surface of the floor.
         ceiling: surface of the ceiling.
         walls: surfaces of the walls at +x, -x, +y, -y of its own frame.
+        panels: doors, windows and the like on the walls, in its own frame.
     """
 
     x: float
@@ -147,6 +148,7 @@ class Hall:
     floor: int
     ceiling: int
     walls: tuple[int, int, int, int]
+    panels: tuple[Part, ...]
 
     def inside(self, points: Float[np.ndarray, "*rows 2"]) -> Float[np.ndarray, "*rows"]:
         """How far points are from the nearest wall [m]; negative outside."""
@@ -222,7 +224,7 @@ WALL = 0.1
 
 
 def hall_parts(hall: Hall) -> tuple[Part, ...]:
-    """Floor, ceiling and walls in the hall's own frame; the floor's upper face is z = 0."""
+    """Panels, then floor, ceiling and walls in the hall's own frame; the floor's upper face is z = 0."""
     (a, b), half, h = hall.half, WALL / 2, hall.height / 2
     slabs = (
         ((0.0, 0.0, -half), (a + WALL, b + WALL, half), hall.floor),
@@ -232,7 +234,7 @@ def hall_parts(hall: Hall) -> tuple[Part, ...]:
         ((0.0, b + half, h), (a, half, h), hall.walls[2]),
         ((0.0, -b - half, h), (a, half, h), hall.walls[3]),
     )
-    return tuple(Part("box", middle, size, surface) for middle, size, surface in slabs)
+    return (*hall.panels, *(Part("box", middle, size, surface) for middle, size, surface in slabs))
 
 
 def solids(room: Room) -> Solids:

@@ -67,7 +67,7 @@ def _furnish(spec: Any, room: Room, pitch: float) -> None:
     _show(spec, spec.worldbody, "room", (hall, *room.standing), room.surfaces)
     for number, thing in enumerate((hall, *room.standing)):
         for place, part in enumerate(thing.parts):
-            if number or place > 1:  # the floor is there, and nobody reaches the ceiling
+            if number or 0 < part.middle[2] < room.hall.height:  # the floor is there, and nobody reaches the ceiling
                 _solid(spec, f"thing{number}_{place}", thing, part)
     for number, person in enumerate(room.people):
         body = spec.body(OBSTACLE.format(number))
