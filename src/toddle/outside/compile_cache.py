@@ -50,7 +50,7 @@ def _keep_kernels(settings: MutableMapping[str, str]) -> None:
     if "NUMBA_CACHE_DIR" in settings:
         return
     package = Path(__file__).parents[1]
-    state = kernels_hash([*kernel_files(package / "walk"), *kernel_files(package / "reach")])
+    state = kernels_hash([path for part in ("walk", "reach", "navigate") for path in kernel_files(package / part)])
     folder = cache_home(settings) / "numba" / f"{_processor()}-{state}"
     try:
         folder.mkdir(parents=True, exist_ok=True)

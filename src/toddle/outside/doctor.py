@@ -67,7 +67,8 @@ def examine() -> tuple[Finding, ...]:
     with ThreadPoolExecutor(len(slow)) as pool:
         asked = [pool.submit(ask) for ask in slow]
         quick = [_python(), *_packages(), *_extras(), _cache(), _port(), _machine()]
-        return (*quick, *(answer.result() for answer in asked))
+        found = [answer.result() for answer in asked]
+        return (*quick, *found, *(_rooms(finding) for finding in found if finding.part == "GL backend"))
 
 
 def _python() -> Finding:
@@ -114,6 +115,12 @@ def _gl_backend() -> Finding:
     if chosen in (None, "") or chosen in working:
         return Finding("GL backend", True, ", ".join(working))
     return Finding("GL backend", False, f"MUJOCO_GL={chosen} draws nothing", remedy=f"export MUJOCO_GL={working[0]}")
+
+
+def _rooms(backend: Finding) -> Finding:
+    """What makes pictures of the rooms that robots walk in; small ones can be made on every machine."""
+    way = f"drawn by {backend.found.split(', ')[0]}" if backend.present else "small ones only, by rays instead of GL"
+    return Finding("room pictures", True, way)
 
 
 def _cache() -> Finding:

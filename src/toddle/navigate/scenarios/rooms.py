@@ -111,7 +111,7 @@ class Person:
 
 @dataclass(frozen=True)
 class Light:
-    """Light without place: a lit surface is ``ambient + sum(colour max(0, -normal direction))``, at most 1, times its texture.
+    """Light without place: ``ambient + sum(colour max(0, -normal direction))``, at most 1, scales a texture.
 
     Attributes:
         ambient: from everywhere.

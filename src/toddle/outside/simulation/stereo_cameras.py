@@ -6,7 +6,7 @@ rays where it has none. The robot's own body is not in the picture: the cameras 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import mujoco
 import numpy as np
@@ -36,6 +36,23 @@ class StereoPicture(NamedTuple):
     left: UInt8[np.ndarray, "rows columns 3"]
     right: UInt8[np.ndarray, "rows columns 3"]
     depth: Float32[np.ndarray, "rows columns"]
+
+
+class Cameras(Protocol):
+    """The pair on a chest."""
+
+    @property
+    def cameras(self) -> RectifiedCameras:
+        """How they look."""
+        ...
+
+    def see(self) -> StereoPicture:
+        """What both see now."""
+        ...
+
+    def close(self) -> None:
+        """Give back what draws."""
+        ...
 
 
 class StereoCamera:
@@ -113,7 +130,7 @@ class StereoCamera:
 
 
 class CastCamera:
-    """What the chest's left camera sees, by rays: small pictures without OpenGL.
+    """What the chest's cameras see, by rays: small pictures without OpenGL.
 
     Attributes:
         cameras: how they look.
@@ -136,11 +153,39 @@ class CastCamera:
         self._people = len(room.people)
         self._caster: RayCaster = ray_caster(room)
 
-    def see(self) -> View:
-        """What the left camera sees now, with the thing that each pixel shows."""
+    def see(self) -> StereoPicture:
+        """What both cameras see now."""
+        left, right = self.view(LEFT), self.view(RIGHT)
+        return StereoPicture(left.picture, right.picture, left.depth)
+
+    def view(self, name: str = LEFT) -> View:
+        """What one camera sees now, with the thing that each pixel shows."""
         _update(self._simulation)
         people = self._simulation.data.mocap_pos[: self._people, :2].copy()
-        return self._caster.view(eye(self._simulation), self.cameras.camera, people)
+        return self._caster.view(eye(self._simulation, name), self.cameras.camera, people)
+
+    def close(self) -> None:
+        """There is nothing to give back."""
+
+
+def open_cameras(simulation: HumanoidSimulation, room: Room, width: int = 320, height: int = 240) -> Cameras:
+    """The chest's cameras by OpenGL where the machine has it, else by rays.
+
+    Args:
+        simulation: made by `rooms.room_simulation`.
+        room: of the simulation.
+        width: of the pictures [pixels].
+        height: likewise.
+
+    Raises:
+        BadInput: there are no such cameras, or the size is out of range.
+    """
+    try:
+        return StereoCamera(simulation, width, height)
+    except BadInput:
+        raise
+    except ToddleError:
+        return CastCamera(simulation, room, width, height)
 
 
 def eye(simulation: HumanoidSimulation, name: str = LEFT) -> Eye:
