@@ -1,7 +1,7 @@
 """A chessboard, its corners in a picture (Huber 2019, figures 2.26 and 4.9), and how it would look to a camera.
 
-Corners are found by OpenCV and refined to a fraction of a pixel. A board of 8 by 6 corners looks the same upside down, so
-the order of its corners in two pictures is made the same by `same_order`.
+Corners are found by OpenCV and refined to a fraction of a pixel. A board of 8 by 6 corners looks the same upside down,
+so the order of its corners in two pictures is made the same by `same_order`.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ class BoardPainter:
     ) -> Float[np.ndarray, "rows columns"]:
         """The board at a pose in the camera's frame [m]: brightness 0 to 255; black where the lens has no ray."""
         rays: np.ndarray = self._rays  # type: ignore[attr-defined]
-        n, height, width = _OVERSAMPLED, self.camera.height, self.camera.width
+        n = _OVERSAMPLED
         light = np.where(np.isnan(rays[n // 2 :: n, n // 2 :: n, 0]), 0.0, _WALL)
         top, bottom, left, right = self._around(rotation, translation)
         rays = rays[n * top : n * bottom, n * left : n * right]

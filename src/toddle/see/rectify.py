@@ -1,8 +1,8 @@
 """Rectification: what two cameras saw, as two ideal cameras side by side would have seen it (Huber 2019, figure 4.10).
 
-Both are turned half the way to each other (Bouguet), so that the same thing stands in the same row of both pictures. The
-ideal camera is ours to choose: left to OpenCV's ``alpha``, the document's fold gives focal lengths from 281 to 466. The
-maps are computed once; a picture then costs one look-up a pixel.
+Both are turned half the way to each other (Bouguet), so that the same thing stands in the same row of both pictures.
+The ideal camera is ours to choose: left to OpenCV's ``alpha``, the document's fold gives focal lengths from 281 to 466.
+The maps are computed once; a picture then costs one look-up a pixel.
 """
 
 from __future__ import annotations
