@@ -114,9 +114,8 @@ def calibrate(views: Sequence[View], board: Chessboard, size: tuple[int, int], *
     for side, fitted in (("left", left), ("right", right)):
         _refuse_degenerate(side, fitted)
     cameras, errors = _joined(kept, board, left.camera, right.camera)
-    alone = tuple(float(np.sqrt(np.mean(one.errors**2))) for one in (left, right))
-    together = float(np.sqrt(np.mean(errors**2)))
-    return Calibration(cameras, tuple(kept), errors, alone, together, tuple(held_out), tuple(dropped))
+    alone = (_overall(left.errors), _overall(right.errors))
+    return Calibration(cameras, tuple(kept), errors, alone, _overall(errors), tuple(held_out), tuple(dropped))
 
 
 def fit_camera(corners: Sequence[Float[np.ndarray, "corners 2"]], board: Chessboard, size: tuple[int, int]) -> Fitted:
@@ -129,18 +128,18 @@ def fit_camera(corners: Sequence[Float[np.ndarray, "corners 2"]], board: Chessbo
     pixels = [view.astype(np.float32)[:, None] for view in corners]
     try:
         _, matrix, bend, turns, _, spread, _, errors = cv2.calibrateCameraExtended(
-            points,
-            pixels,
-            size,
-            None,
-            None,
-            criteria=_STOP,  # type: ignore[call-overload]
+            points, pixels, size, np.zeros((3, 3)), np.zeros(5), criteria=_STOP
         )
     except cv2.error as fault:
         raise ToddleError("no camera fits these views", where="calibration", remedy="take other pictures") from fault
     normals = np.stack([cv2.Rodrigues(turn)[0][:, 2] for turn in turns])
     camera = _pinhole(matrix, bend, size)
     return Fitted(camera, np.ravel(errors), normals, float(np.max(spread.ravel()[:2]) / camera.fx))
+
+
+def _overall(errors: Float[np.ndarray, "*views"]) -> float:
+    """The root mean square of root mean squares [pixels]."""
+    return float(np.sqrt(np.mean(errors**2)))
 
 
 def _pinhole(matrix: np.ndarray, bend: np.ndarray, size: tuple[int, int]) -> Pinhole:

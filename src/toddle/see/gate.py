@@ -56,7 +56,7 @@ class Judged(NamedTuple):
 
 
 def judge(
-    views: Sequence[View], board: Chessboard, cameras: StereoCameras, *, distances: Sequence[float] = ()
+    views: Sequence[View], board: Chessboard, cameras: StereoCameras, *, known: Sequence[tuple[View, float]] = ()
 ) -> Judged:
     """Judge a calibration.
 
@@ -64,16 +64,13 @@ def judge(
         views: boards that it does not rest on, four or more.
         board: what they show.
         cameras: as calibrated.
-        distances: of each board's middle along the rectified left camera's axis, where they are known [m].
+        known: boards whose distance is known: of their middle, along the rectified left camera's axis [m].
 
     Raises:
-        BadInput: too few views, or not one distance for each.
+        BadInput: too few views.
     """
     if len(views) < _FEWEST:
         raise BadInput(f"{len(views)} boards judge nothing", where="gate", remedy=f"keep out {_FEWEST} or more")
-    if distances and len(distances) != len(views):
-        what = f"{len(distances)} distances for {len(views)} boards"
-        raise BadInput(what, where="gate", remedy="give one for each board")
     made = rectification(cameras)
     pairs = [both_rectified(view, cameras, made) for view in views]
     rows = np.abs(np.concatenate([right[:, 1] - left[:, 1] for left, right in pairs]))
@@ -83,12 +80,19 @@ def judge(
     rest = [[*pairs[:number], *pairs[number + 1 :]] for number in range(len(pairs))]
     depths = [_depth_error(_wrong(some, board, made.cameras), made.cameras) for some in rest]
     unsure = float(np.sqrt((len(pairs) - 1) * np.var(depths)))  # the jackknife
-    found = [float(np.nanmean(_triangulated(pair, made.cameras)[:, 2])) for pair in pairs]
-    known = float(np.mean(np.subtract(found, distances))) if distances else float("nan")
+    places = [(distance_of(view, cameras, made), truth) for view, truth in known]
+    off = float(np.mean([place - truth for place, truth in places])) if places else float("nan")
     middle = float(np.median(rows))
-    trouble = _trouble(middle, depth, unsure, found, distances)
+    trouble = _trouble(middle, depth, unsure, places)
     mean = float(np.mean(rows))
-    return Judged(len(views), middle, mean, float(wrong[0]), float(wrong[1]), depth, unsure, known, trouble)
+    return Judged(
+        len(views), middle, mean, float(wrong[0]), float(wrong[1]), depth, unsure, off, trouble,
+    )  # fmt: skip
+
+
+def distance_of(view: View, cameras: StereoCameras, made: Rectification) -> float:
+    """How far a board's middle is seen along the rectified left camera's axis [m]."""
+    return float(np.nanmean(_triangulated(both_rectified(view, cameras, made), made.cameras)[:, 2]))
 
 
 def both_rectified(
@@ -161,17 +165,15 @@ def _depth_error(wrong: Float[np.ndarray, "2"], ideal: RectifiedCameras) -> floa
     return float(ideal.camera.fx * ideal.baseline / seen / FAR - 1)
 
 
-def _trouble(
-    rows: float, depth: float, unsure: float, found: Sequence[float], distances: Sequence[float]
-) -> tuple[str, ...]:
+def _trouble(rows: float, depth: float, unsure: float, places: Sequence[tuple[float, float]]) -> tuple[str, ...]:
     said = []
-    if rows > WORST_ROWS:
+    if not rows <= WORST_ROWS:
         said.append(f"boards kept out stand {rows:.2f} px apart in height")
-    if abs(depth) > WORST_DEPTH:
+    if not abs(depth) <= WORST_DEPTH:
         said.append(f"boards kept out say that depth at {FAR} m is wrong by {100 * depth:+.0f} %")
-    elif unsure > WORST_DEPTH:
+    elif not unsure <= WORST_DEPTH:
         said.append(f"boards kept out leave the depth at {FAR} m unsure by {100 * unsure:.0f} %: show more")
-    for place, truth in zip(found, distances, strict=False):
-        if abs(place - truth) > WORST_DEPTH * truth:
+    for place, truth in places:
+        if not abs(place - truth) <= WORST_DEPTH * truth:
             said.append(f"a board at {truth:.2f} m is seen at {place:.2f} m")
     return tuple(said)

@@ -3,8 +3,6 @@
 The same thing must stand in the same row of both pictures. Where features of both (SIFT, Lowe 2004) say otherwise, the
 difference is fitted by three parameters: a shift (pitch), a slope across (roll) and a slope down (focal lengths that
 differ). A turn about the vertical axis changes no rows and stays unseen: depth from it needs a known distance.
-
-The same features tell whether a pair was rectified already: rectified once more, its rows would part.
 """
 
 from __future__ import annotations
@@ -15,7 +13,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Shaped, UInt8
 
-from toddle.see.rectify import Maps, Rectification, rectify
+from toddle.see.rectify import Maps
 
 FEWEST = 20
 """Matches, less than which say nothing."""
@@ -23,6 +21,7 @@ _RATIO = 0.8  # Lowe's: the best match must be better than the next by so much
 _FOLDS = 5
 _TUKEY = 4.685
 _LEAST_SPREAD = 0.05  # pixels
+_HELPS = 0.8
 
 
 class Matches(NamedTuple):
@@ -59,6 +58,11 @@ class Misalignment(NamedTuple):
     slope_down: float
     median_after: float
     p90_after: float
+
+    @property
+    def worth_it(self) -> bool:
+        """Whether setting it right helps pictures that the fit did not see."""
+        return self.median_after < _HELPS * self.median
 
 
 def matched(
@@ -133,62 +137,9 @@ def both_in_one(first: Maps, then: Maps) -> Maps:
     return Maps(source, then.valid & (inside > 0.999))
 
 
-class Verdict(NamedTuple):
-    """Whether a pair was rectified before.
-
-    Attributes:
-        rectified: it was; None: the pictures don't tell.
-        as_it_is: median distance between the rows of matches in the pair as it is [pixels]; NaN: too few.
-        once_more: the same after rectifying it [pixels]; NaN: too few.
-        black: how well the black edges are those that rectification leaves: their overlap, 0 to 1; NaN: there are none.
-    """
-
-    rectified: bool | None
-    as_it_is: float
-    once_more: float
-    black: float
-
-
-def was_rectified(
-    left: Shaped[np.ndarray, "rows columns *colours"], right: Shaped[np.ndarray, "rows columns *colours"],
-    made: Rectification, *, edges: tuple[Maps, Maps] | None = None,
-) -> Verdict:  # fmt: skip
-    """Tell a pair that was rectified from one that was not.
-
-    Args:
-        left: picture.
-        right: picture.
-        made: how the cameras' own pictures are rectified.
-        edges: maps of an earlier rectification, whose black edges are looked for; unless given, those of ``made``.
-    """
-    as_it_is = _apart(left, right)
-    once_more = _apart(rectify(made.left, left), rectify(made.right, right))
-    expected = edges or (made.left, made.right)
-    black = float(np.nanmean([_overlap(p, maps) for p, maps in zip((left, right), expected, strict=True)]))
-    if np.isfinite(as_it_is) and np.isfinite(once_more):
-        return Verdict(as_it_is < once_more, as_it_is, once_more, black)
-    return Verdict(None if np.isnan(black) else black > 0.9, as_it_is, once_more, black)
-
-
 def grey(picture: UInt8[np.ndarray, "rows columns *colours"]) -> UInt8[np.ndarray, "rows columns"]:
     """A picture's brightness; colours are blue, green, red."""
     return picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
-
-
-def _apart(left: np.ndarray, right: np.ndarray) -> float:
-    """The median distance between the rows of matches [pixels]."""
-    found = matched(grey(left), grey(right), reach=60.0)
-    if len(found.left) < FEWEST:
-        return float("nan")
-    return float(np.median(np.abs(found.right[:, 1] - found.left[:, 1])))
-
-
-def _overlap(picture: np.ndarray, maps: Maps) -> float:
-    """Intersection over union of what is black and what the maps leave black; NaN where neither is anything."""
-    black = grey(picture) == 0
-    expected = np.any((maps.source <= -1) | (maps.source >= picture.shape[1::-1]), axis=-1)
-    either = np.count_nonzero(black | expected)
-    return np.count_nonzero(black & expected) / either if either > 0.01 * black.size else float("nan")
 
 
 def _away_from_black(picture: UInt8[np.ndarray, "rows columns"]) -> UInt8[np.ndarray, "rows columns"]:

@@ -1,23 +1,23 @@
 """Two calibrated cameras as files: ROS ``camera_info`` (read and written), OpenCV's YAML and Kalibr's camchain (read).
 
 A ROS pair is two files, ``left.yaml`` and ``right.yaml``; how the cameras stand to each other follows from their
-rectifications. OpenCV's own files, as the document's, don't say how large the pictures were: that comes from the pictures.
+rectifications. OpenCV's own files, as the document's, don't say how large the pictures were: that comes from the
+pictures.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
-from jaxtyping import Float
 
 from toddle.failures import BadInput
-from toddle.geometry.camera import Pinhole, StereoCameras
+from toddle.geometry.camera import Pinhole, RectifiedCameras, StereoCameras
 from toddle.outside.files import write_bytes
-from toddle.see.rectify import Rectification
+from toddle.see.rectify import Rectification, maps_of
 
 _LARGEST = 2**20  # bytes; a camera is a few kilobytes
 _FARTHEST = 10.0  # m between two cameras
@@ -29,13 +29,12 @@ class CameraFile(NamedTuple):
 
     Attributes:
         cameras: both.
-        rotations: R_1 and R_2 of the rectification that it holds; None: it holds none.
-        projections: P_1 and P_2 of that, without their last column.
+        earlier: the rectification that it holds, with which pictures may have been rectified before; None: it holds
+            none, or one whose two cameras aren't alike.
     """
 
     cameras: StereoCameras
-    rotations: tuple[Float[np.ndarray, "3 3"], Float[np.ndarray, "3 3"]] | None = None
-    projections: tuple[Float[np.ndarray, "3 3"], Float[np.ndarray, "3 3"]] | None = None
+    earlier: Rectification | None = None
 
 
 class _Loader(yaml.SafeLoader):
@@ -154,7 +153,7 @@ def _ros(one: Mapping[Any, Any], left: Path, other: Mapping[Any, Any], right: Pa
         raise BadInput(what, where=str(right), remedy="calibrate both cameras together, and write both files")
     across = np.array([shift / focal, 0.0, 0.0])
     cameras = StereoCameras(pair[0], pair[1], turns[1].T @ turns[0], turns[1].T @ across)
-    return CameraFile(cameras, (turns[0], turns[1]), (projections[0][:, :3], projections[1][:, :3]))
+    return CameraFile(cameras, _earlier(cameras, turns, projections))
 
 
 def _opencv(facts: Mapping[Any, Any], path: Path, size: tuple[int, int] | None) -> CameraFile:
@@ -173,9 +172,22 @@ def _opencv(facts: Mapping[Any, Any], path: Path, size: tuple[int, int] | None) 
     cameras = StereoCameras(left, right, _turn(facts, "R", path), translation)
     if not {"R1", "R2", "P1", "P2"} <= facts.keys():
         return CameraFile(cameras)
-    turns = (_turn(facts, "R1", path), _turn(facts, "R2", path))
-    first, second = (_matrix(facts, name, (3, 4), path)[:, :3] for name in ("P1", "P2"))
-    return CameraFile(cameras, turns, (first, second))
+    turns = [_turn(facts, name, path) for name in ("R1", "R2")]
+    return CameraFile(cameras, _earlier(cameras, turns, [_matrix(facts, name, (3, 4), path) for name in ("P1", "P2")]))
+
+
+def _earlier(
+    cameras: StereoCameras, turns: Sequence[np.ndarray], projections: Sequence[np.ndarray]
+) -> Rectification | None:
+    """The rectification that a file holds."""
+    one, other = (projection[:, :3] for projection in projections)
+    if np.abs(one - other).max() > 1e-6 * np.abs(one).max() or min(one[0, 0], one[1, 1]) <= 0:
+        return None
+    left, right = cameras.left, cameras.right
+    fx, fy, cx, cy = (float(one[place]) for place in ((0, 0), (1, 1), (0, 2), (1, 2)))
+    ideal = Pinhole(left.width, left.height, fx, fy, cx, cy)
+    maps = [maps_of(camera, turn, ideal) for camera, turn in zip((left, right), turns, strict=True)]
+    return Rectification(maps[0], maps[1], (turns[0], turns[1]), RectifiedCameras(ideal, cameras.baseline))
 
 
 def _kalibr(facts: Mapping[Any, Any], path: Path) -> CameraFile:
