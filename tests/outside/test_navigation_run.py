@@ -133,6 +133,15 @@ def test_other_numbers_are_refused(tmp_path: Path) -> None:
         plan(tmp_path, saved_every=0)
 
 
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [({"devices": 999}, "--devices"), ({"devices": 2, "seeds": 2}, "--devices"), ({"devices": 0}, "devices")],
+)
+def test_devices_that_are_not_there_are_refused(tmp_path: Path, changes: dict[str, int], said: str) -> None:
+    with pytest.raises(BadInput, match=said):
+        run(TASK, CONFIG, plan(tmp_path, **changes))
+
+
 def test_the_best_policy_is_kept(tmp_path: Path) -> None:
     """A judge that likes the sixth update best; then the last policy isn't the one that is left."""
     seen: dict[int, Policy] = {}

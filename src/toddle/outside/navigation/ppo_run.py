@@ -19,6 +19,7 @@ import numpy as np
 from toddle.failures import BadInput
 from toddle.navigate.policy import Policy
 from toddle.navigate.ppo.config import PpoConfig
+from toddle.navigate.ppo.sharding import shard
 from toddle.navigate.ppo.training import Training
 from toddle.navigate.task import Actions, Outcome, Task
 from toddle.outside.files import make_folder
@@ -68,6 +69,7 @@ class Plan:
         seeds: runs side by side, each with the next seed.
         saved_every: updates between two checkpoints.
         judged_every: updates between two trials.
+        devices: that share the actors; one seed only.
     """
 
     folder: Path
@@ -77,6 +79,7 @@ class Plan:
     seeds: int = 1
     saved_every: int = 50
     judged_every: int = 25
+    devices: int = 1
 
     def __post_init__(self) -> None:
         """Refuses counts below one.
@@ -84,7 +87,7 @@ class Plan:
         Raises:
             BadInput: which.
         """
-        for name in ("seeds", "saved_every", "judged_every"):
+        for name in ("seeds", "saved_every", "judged_every", "devices"):
             if getattr(self, name) < 1:
                 where = f"--{name.replace('_', '-')}"
                 raise BadInput(f"{getattr(self, name)} is no use", where=where, remedy="give 1 or more")
@@ -160,6 +163,8 @@ def run(
     watch = _Watch(task, config, plan, judge, reporter, stop)
     started = time.perf_counter()
     course = _first(watch, begun, resume)
+    if plan.devices > 1:
+        course = course._replace(training=_spread(plan, course.training))
     if advance is None:
         drive = _in_jax(watch)
         jax.block_until_ready(drive(course.training, 0))  # no update: it is only compiled
@@ -193,6 +198,20 @@ class _Watch:
 def _in_jax(watch: _Watch) -> Drive:
     task, config, seeds = watch.task, watch.config, watch.plan.seeds
     return lambda training, count: ppo_course.updates(task, config, seeds, training, jnp.int32(count))
+
+
+def _spread(plan: Plan, training: Training) -> Training:
+    """The actors shared by devices.
+
+    Raises:
+        BadInput: there are too few devices, they can't share evenly, or there are several seeds.
+    """
+    if plan.seeds > 1:
+        raise BadInput("several seeds lie on one device", where="--devices", remedy="leave --seeds or it out")
+    there = jax.devices()
+    if plan.devices > len(there):
+        raise BadInput(f"there are {len(there)}", where="--devices", remedy=f"give 1 to {len(there)}")
+    return shard(training, there[: plan.devices])
 
 
 def _first(watch: _Watch, begun: Training | None, resume: bool) -> Course:
