@@ -117,7 +117,8 @@ class RayCaster:
         raycast_kernels.shade(
             parts.middle, parts.half, parts.yaw, parts.round, parts.surface, eye.position, eye.axes,
             camera.fx, camera.fy, camera.cx, camera.cy, depth, solid, self.texels, self.starts, self.sizes, self.tiles,
-            np.array(light.ambient), np.array(light.directions), np.array(light.colours), picture,
+            np.array(light.ambient), np.array(light.directions).reshape(-1, 3), np.array(light.colours).reshape(-1, 3),
+            picture,
         )  # fmt: skip
         return View(picture, depth, parts.thing[solid])
 

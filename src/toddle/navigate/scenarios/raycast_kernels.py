@@ -219,12 +219,11 @@ def shade(
             over_a, over_b = abs(a) - half[number, 0], abs(b) - half[number, 1]
             over_c = abs(c) - half[number, 2]
             if rounds[number]:
-                reach = math.sqrt(a * a + b * b)
-                over_a, over_b = reach - half[number, 0], -1.0
+                over_a, over_b = math.sqrt(a * a + b * b) - half[number, 0], -1.0
             if over_c >= max(over_a, over_b):
                 light, facing, s, t = faces[number, 4 if c > 0 else 5], abs(rz), a, b
             elif rounds[number]:
-                nx, ny = (cos * a - sin * b) / reach, (sin * a + cos * b) / reach
+                nx, ny = (cos * a - sin * b) / half[number, 0], (sin * a + cos * b) / half[number, 0]
                 _lit(nx, ny, 0.0, ambient, directions, colours, side_light)
                 light, facing, s, t = side_light, abs(nx * rx + ny * ry), math.atan2(b, a) * half[number, 0], c
             elif over_a >= over_b:

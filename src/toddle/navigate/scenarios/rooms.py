@@ -154,7 +154,7 @@ class Hall:
         """How far points are from the nearest wall [m]; negative outside."""
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
         own = (points - np.array([self.x, self.y])) @ np.array([[cos, -sin], [sin, cos]])
-        return (np.array(self.half) - np.abs(own)).min(axis=-1)
+        return np.asarray((np.array(self.half) - np.abs(own)).min(axis=-1))
 
 
 class Solids(NamedTuple):

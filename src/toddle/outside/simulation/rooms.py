@@ -32,6 +32,7 @@ SHOWN, TOUCHED = 0, 5
 LEFT, RIGHT = "left_chest_camera", "right_chest_camera"
 """Names of the cameras, where the robot's eyes are, looking down."""
 
+_EYES = "left_eye", "right_eye"
 _SOLID = 3  # stops soles and shells, as the world's obstacles do
 _ZNEAR, _ZFAR = 0.03, 25.0  # [m]
 
@@ -48,13 +49,15 @@ def room_simulation(
         pitch: how far the chest's cameras look down [rad].
 
     Raises:
-        BadInput: the options have circles, or the humanoid lacks something.
+        BadInput: the options have circles, or the humanoid lacks something, such as cameras left_eye and right_eye.
     """
     options = options or WorldOptions()
     if options.circles:
         raise BadInput(
             "the world has circles of its own", where="room", remedy="leave them out: people take their place"
         )
+    if any(humanoid.spec.camera(eye) is None for eye in _EYES):
+        raise BadInput("there are no cameras left_eye and right_eye", where=humanoid.name, remedy="give it eyes")
     circles = tuple(Circle(who.looks.x, who.looks.y, who.looks.radius) for who in room.people)
     return HumanoidSimulation(humanoid, replace(options, circles=circles), lambda spec: _furnish(spec, room, pitch))
 
@@ -161,7 +164,7 @@ def _cameras(spec: Any, pitch: float) -> None:
     """Two cameras where the eyes are, turned down about their own x."""
     camera = CHEST_CAMERAS.camera
     down = np.array([math.cos(pitch / 2), -math.sin(pitch / 2), 0.0, 0.0])
-    for name, eye in ((LEFT, "left_eye"), (RIGHT, "right_eye")):
+    for name, eye in zip((LEFT, RIGHT), _EYES, strict=True):
         seat, turned_down = spec.camera(eye), np.zeros(4)
         mujoco.mju_mulQuat(turned_down, np.array(seat.quat), down)
         _ = seat.parent.add_camera(

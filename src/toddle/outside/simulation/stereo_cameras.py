@@ -6,7 +6,7 @@ rays where it has none. The robot's own body is not in the picture: the cameras 
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -36,23 +36,6 @@ class StereoPicture(NamedTuple):
     left: UInt8[np.ndarray, "rows columns 3"]
     right: UInt8[np.ndarray, "rows columns 3"]
     depth: Float32[np.ndarray, "rows columns"]
-
-
-class Cameras(Protocol):
-    """The pair on a chest."""
-
-    @property
-    def cameras(self) -> RectifiedCameras:
-        """How they look."""
-        ...
-
-    def see(self) -> StereoPicture:
-        """What both see now."""
-        ...
-
-    def close(self) -> None:
-        """Give back what draws."""
-        ...
 
 
 class StereoCamera:
@@ -168,7 +151,9 @@ class CastCamera:
         """There is nothing to give back."""
 
 
-def open_cameras(simulation: HumanoidSimulation, room: Room, width: int = 320, height: int = 240) -> Cameras:
+def open_cameras(
+    simulation: HumanoidSimulation, room: Room, width: int = 320, height: int = 240
+) -> StereoCamera | CastCamera:
     """The chest's cameras by OpenGL where the machine has it, else by rays.
 
     Args:
