@@ -47,7 +47,6 @@ def main(argv: Sequence[str]) -> int:
     asked = parse(Rectify, argv, prog=_PROG)
     from toddle.cli.run_folder import new_folder
     from toddle.outside.files import write_json
-    from toddle.outside.seeing import seeing_pictures as pictures
     from toddle.outside.seeing.camera_files import read_cameras
     from toddle.outside.seeing.picture_files import read_picture, write_picture
     from toddle.see.pair import make_ready
@@ -65,13 +64,21 @@ def main(argv: Sequence[str]) -> int:
     folder = new_folder(asked.out, "rectify")
     write_picture(folder / "left.png", ready.left)
     write_picture(folder / "right.png", ready.right)
-    pictures.before_and_after(folder / "rectified.png", (left, right), (ready.left, ready.right))
+    _draw(folder, (left, right), ready)
     figures = _figures(ready, asked)
     write_json(folder / "figures.json", figures)
     _tell(figures, folder, as_json=asked.json)
     for said in ready.trouble:
         print(f"toddle: {said}", file=sys.stderr)
     return 0
+
+
+def _draw(folder: Path, given: tuple[Any, Any], ready: Ready) -> None:
+    """Figures 4.10 and 4.11 of the document."""
+    from toddle.outside.seeing.seeing_pictures import before_and_after
+
+    title = "rectified, and what was still off set right" if ready.straightened else "rectified"
+    before_and_after(folder / "rectified.png", given, (ready.left, ready.right), titles=("as given", title))
 
 
 def _figures(ready: Ready, asked: Rectify) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 Each camera alone first, then both together. A view whose error is above 2.5 times the median of its kind is dropped and
 named (a board that moved between the two exposures shows only where both are joined), and the rest is solved again. A
-low error is no proof: every fifth good view is kept out of the solution, and judged by `toddle.see.gate`.
+low error is no proof: a fifth of the good views is kept out of the solution, and judged by `toddle.see.gate`.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ OUTLYING = 2.5
 """Times the median error: a view above it is dropped."""
 FEWEST = 8
 """Views, less than which say too little of a lens."""
+FEWEST_KEPT_OUT = 4
+"""Views, less than which judge nothing."""
 _TILTED = 15.0  # degrees: the least greatest angle between two boards
 _UNSURE = 0.02  # of the focal length: its standard deviation
 _ROUNDS = 5
@@ -88,14 +90,22 @@ class Calibration(NamedTuple):
     dropped: tuple[Dropped, ...]
 
 
-def calibrate(views: Sequence[View], board: Chessboard, size: tuple[int, int], *, hold_out: int = 5) -> Calibration:
+def calibrate(
+    views: Sequence[View],
+    board: Chessboard,
+    size: tuple[int, int],
+    *,
+    hold_out: bool = True,
+    outlying: float = OUTLYING,
+) -> Calibration:
     """Intrinsics, distortion, rotation and translation of two cameras.
 
     Args:
         views: of the board, many and tilted; 60 in the document.
         board: its corners are the views' rows.
         size: of the pictures: width, height [pixels].
-        hold_out: every so many of the good views is kept out, to judge by; 0: none is.
+        outlying: times the median error: a view above it is dropped.
+        hold_out: a fifth of the good views, four at least, is kept out to judge by.
 
     Raises:
         BadInput: too few views, or views that don't tell the lens.
@@ -104,12 +114,12 @@ def calibrate(views: Sequence[View], board: Chessboard, size: tuple[int, int], *
     _check(views, board)
     kept, dropped = list(views), []
     for side in ("left", "right"):
-        kept, gone = _without_outliers(kept, board, size, side)
+        kept, gone = _without_outliers(kept, board, size, side, outlying)
         dropped += gone
-    kept, gone = _without_misfits(kept, board, size)
+    kept, gone = _without_misfits(kept, board, size, outlying)
     dropped += gone
-    held_out = kept[hold_out - 1 :: hold_out] if hold_out and len(kept) - len(kept) // hold_out >= FEWEST else []
-    kept = [view for view in kept if view not in held_out] if held_out else kept
+    held_out = _evenly(kept) if hold_out else []
+    kept = [view for view in kept if not any(view is one for one in held_out)]
     left, right = (fit_camera([getattr(view, side) for view in kept], board, size) for side in ("left", "right"))
     for side, fitted in (("left", left), ("right", right)):
         _refuse_degenerate(side, fitted)
@@ -160,37 +170,54 @@ def _check(views: Sequence[View], board: Chessboard) -> None:
                 raise BadInput(f"it has no {corners} corners", where=view.name, remedy="check the board's size")
 
 
+def _evenly(views: list[View]) -> list[View]:
+    """A fifth of the views, from all over the recording."""
+    count = max(len(views) // 5, FEWEST_KEPT_OUT)
+    if len(views) - count < FEWEST:
+        what = f"{len(views)} good views are too few to calibrate from and to judge by"
+        remedy = f"give {FEWEST + FEWEST_KEPT_OUT} or more, better 60"
+        raise BadInput(what, where="calibration", remedy=remedy)
+    places = {round((number + 0.5) * len(views) / count - 0.5) for number in range(count)}
+    return [view for number, view in enumerate(views) if number in places]
+
+
 def _without_outliers(
-    views: list[View], board: Chessboard, size: tuple[int, int], side: str
+    views: list[View], board: Chessboard, size: tuple[int, int], side: str, outlying: float
 ) -> tuple[list[View], list[Dropped]]:
     """The views that one camera agrees on, and the others."""
     dropped: list[Dropped] = []
     for _ in range(_ROUNDS):
         errors = fit_camera([getattr(view, side) for view in views], board, size).errors
-        views, gone = _split(views, errors, f"in the {side} camera")
+        views, gone = _split(views, errors, outlying, f"in the {side} camera")
         dropped += gone
         if not gone:
             break
     return views, dropped
 
 
-def _without_misfits(views: list[View], board: Chessboard, size: tuple[int, int]) -> tuple[list[View], list[Dropped]]:
+def _without_misfits(
+    views: list[View], board: Chessboard, size: tuple[int, int], outlying: float
+) -> tuple[list[View], list[Dropped]]:
     """The views that both cameras agree on, and the others."""
     dropped: list[Dropped] = []
     for _ in range(_ROUNDS):
         left, right = (fit_camera([getattr(view, side) for view in views], board, size) for side in ("left", "right"))
         _, errors = _joined(views, board, left.camera, right.camera)
-        views, gone = _split(views, np.sqrt(np.mean(errors**2, axis=1)), "between the cameras: it moved, or is blurred")
+        views, gone = _split(
+            views, np.sqrt(np.mean(errors**2, axis=1)), outlying, "between the cameras: it moved, or is blurred"
+        )
         dropped += gone
         if not gone:
             break
     return views, dropped
 
 
-def _split(views: list[View], errors: Float[np.ndarray, " views"], where: str) -> tuple[list[View], list[Dropped]]:
+def _split(
+    views: list[View], errors: Float[np.ndarray, " views"], outlying: float, where: str
+) -> tuple[list[View], list[Dropped]]:
     """The views near the median error, and those far above it."""
     middle = float(np.median(errors))
-    far = errors > OUTLYING * middle
+    far = errors > outlying * middle
     if len(views) - far.sum() < FEWEST:
         remedy = "hold the board and the cameras still, and take more pictures"
         raise BadInput("too few views agree with each other", where="calibration", remedy=remedy)

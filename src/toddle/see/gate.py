@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 from toddle.failures import BadInput
 from toddle.geometry.camera import RectifiedCameras, StereoCameras
-from toddle.see.calibrate import View
+from toddle.see.calibrate import FEWEST_KEPT_OUT, View
 from toddle.see.chessboard import Chessboard
 from toddle.see.rectify import Rectification, rectification, rectified_points
 
@@ -26,7 +26,7 @@ WORST_DEPTH = 0.05
 """Error of depth, as a share of it, above which a calibration is refused."""
 FAR = 2.5
 """Where that error is told [m]."""
-_STEPS, _FEWEST = 8, 4
+_STEPS = 8
 
 
 class Judged(NamedTuple):
@@ -69,8 +69,8 @@ def judge(
     Raises:
         BadInput: too few views.
     """
-    if len(views) < _FEWEST:
-        raise BadInput(f"{len(views)} boards judge nothing", where="gate", remedy=f"keep out {_FEWEST} or more")
+    if len(views) < FEWEST_KEPT_OUT:
+        raise BadInput(f"{len(views)} boards judge nothing", where="gate", remedy=f"keep out {FEWEST_KEPT_OUT} or more")
     made = rectification(cameras)
     pairs = [both_rectified(view, cameras, made) for view in views]
     rows = np.abs(np.concatenate([right[:, 1] - left[:, 1] for left, right in pairs]))

@@ -1,0 +1,1 @@
+"""Seeing, measured against a known truth."""
