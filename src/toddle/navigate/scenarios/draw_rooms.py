@@ -1,4 +1,4 @@
-"""Rooms drawn by number: the same scenario, split, style and number give the same room, on every machine.
+"""Rooms drawn by number: the same scenario, split, style and number give the same room.
 
 A draw is thrown away and made anew while something overlaps, no way leads to the target (`planner`), or the target,
 faced from the start, fills fewer than `FEWEST` pixels of the small picture. Each split draws from random streams of its
