@@ -17,6 +17,7 @@ from toddle.failures import BadInput
 from toddle.geometry.camera import Pinhole, RectifiedCameras, StereoCameras
 from toddle.see.lens import fold, rays_of
 
+_EDGE = 1e-3  # pixels: what rounding may take off the border
 _TRUSTED = 0.9  # of the fold: nearer to it a pixel's neighbours lie far apart
 
 
@@ -85,7 +86,7 @@ def _seen(
     columns, rows = np.meshgrid(np.arange(ideal.width), np.arange(ideal.height))
     rays = np.stack([(columns - ideal.cx) / ideal.fx, (rows - ideal.cy) / ideal.fy, np.ones_like(rows)], axis=-1)
     x, y, z = np.moveaxis(rays @ rotation, -1, 0)
-    inside = np.all((source >= 0) & (source <= (camera.width - 1, camera.height - 1)), axis=-1)
+    inside = np.all((source >= -_EDGE) & (source <= (camera.width - 1 + _EDGE, camera.height - 1 + _EDGE)), axis=-1)
     return inside & (z > 0) & (np.hypot(x, y) < _TRUSTED * fold(camera) * z)
 
 

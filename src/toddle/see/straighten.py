@@ -164,8 +164,10 @@ def _consistent(
     near = np.abs(apart - np.median(apart)) < reach
     if near.sum() < 8:
         return near
-    cv2.setRNGSeed(0)
-    _, good = cv2.findFundamentalMat(first[near], second[near], cv2.USAC_MAGSAC, 1.5, 0.999, 5000)
+    try:
+        _, good = cv2.findFundamentalMat(first[near], second[near], cv2.USAC_MAGSAC, 1.5, 0.999, 5000)
+    except cv2.error:  # it found no matrix: the fit of the rows must do without
+        return near
     kept = near.copy()
     kept[near] = False if good is None else good.ravel() > 0
     return kept
