@@ -5,8 +5,8 @@
 On one core. A pair is the left and the right picture with the depth of the left one; a view is what the ray-caster
 gives of one camera: picture, depth, and the thing that each pixel shows. Speeds are of the CPU time of the process, the
 best of five rounds in each room, the robot turned further for each picture; least and most over rooms. A walk is ten
-seconds straight ahead at 0.1 m/s with pictures ten times a second. Drawn and cast agree at a pixel if the drawn depth is
-within the cast ones of the pixel and its eight neighbours, 2 mm to spare.
+seconds straight ahead at 0.1 m/s with pictures ten times a second. Drawn and cast agree at a pixel if the drawn depth
+is within the cast ones of the pixel and its eight neighbours, 2 mm to spare.
 """
 
 from __future__ import annotations

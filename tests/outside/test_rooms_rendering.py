@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 
+import mujoco
 import numpy as np
 import pytest
 from box_biped import biped as without_eyes
@@ -99,6 +100,21 @@ def test_the_right_picture_is_the_left_one_moved_by_the_disparity(stage: tuple[R
     assert (np.abs(there - left.depth[inside]) < 0.05).mean() > 0.85
 
 
+def test_left_is_left_in_both_ways(stage: tuple[Room, HumanoidSimulation]) -> None:
+    drawn, simulation = stage
+    cast = CastCamera(simulation, drawn, 160, 120)
+    pair, left, right = cast.see(), cast.view(LEFT), cast.view(RIGHT)
+    assert (pair.left == left.picture).all()
+    assert (pair.right == right.picture).all()
+    assert (pair.depth == left.depth).all()
+    camera = drawing(simulation, 160, 120)
+    seen = camera.see()
+    camera.close()
+    for picture, same, other in ((seen.left, left, right), (seen.right, right, left)):
+        near, far = (np.abs(picture.astype(int) - view.picture).mean() for view in (same, other))
+        assert near < 0.7 * far
+
+
 def test_the_drawn_size_is_the_cameras() -> None:
     simulation = room_simulation(heicub(), room("curve", "train", 1))
     camera = drawing(simulation, 160, 120)
@@ -144,6 +160,24 @@ def test_furniture_and_walls_are_touched(stage: tuple[Room, HumanoidSimulation])
         found = simulation.truth()
         assert found.touching.any()
         assert found.clearance.min() < 0
+    simulation.reset()
+
+
+def test_the_clearance_is_that_of_the_nearest_pair(stage: tuple[Room, HumanoidSimulation]) -> None:
+    """Every geom of the robot against every one that stands around, without any shortcut."""
+    drawn, simulation = stage
+    model, data = simulation.model, simulation.data
+    stands = np.flatnonzero(model.geom_contype & 2).tolist()
+    robot = [geom for geom in range(model.ngeom) if model.geom_conaffinity[geom] and model.geom_bodyid[geom]]
+    nearest = []
+    for thing in drawn.standing[:2]:
+        q = simulation.humanoid.home.copy()
+        q[:2] = thing.x - thing.radius - 0.3, thing.y
+        simulation.reset(q)
+        every = [mujoco.mj_geomDistance(model, data, one, other, 1.0, None) for one in robot for other in stands]
+        nearest.append(min(every))
+        assert simulation.truth().clearance.min() == pytest.approx(min(every), abs=1e-6)
+    assert min(nearest) < 0.5
     simulation.reset()
 
 

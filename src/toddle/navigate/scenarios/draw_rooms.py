@@ -59,11 +59,11 @@ class Task(NamedTuple):
 
 TASKS: dict[Scenario, Task] = {
     "straight": Task((1.8, 3.5), (0.0, 6.0)),
-    "curve": Task((1.8, 3.5), (15.0, 45.0)),
+    "curve": Task((1.8, 3.5), (15.0, 31.0)),
     "obstacle": Task((2.6, 3.8), (0.0, 10.0)),
     "search": Task((1.8, 3.5), (90.0, 180.0)),
     "person": Task((2.6, 3.8), (0.0, 10.0)),
-    "decoys": Task((1.8, 3.5), (0.0, 45.0)),
+    "decoys": Task((1.8, 3.5), (0.0, 31.0)),
 }
 """Of each scenario."""
 
