@@ -23,7 +23,7 @@ from toddle.see.rectify import Rectification, rectification, rectified_points
 WORST_ROWS = 0.25
 """Vertical misalignment above which block matching suffers [pixels]."""
 WORST_DEPTH = 0.05
-"""Error of depth, as a share of it, above which a calibration is refused."""
+"""Error of depth, as a share of it, that must be ruled out (by two standard errors) for a calibration to be trusted."""
 FAR = 2.5
 """Where that error is told [m]."""
 _STEPS = 8
@@ -171,8 +171,8 @@ def _trouble(rows: float, depth: float, unsure: float, places: Sequence[tuple[fl
         said.append(f"boards kept out stand {rows:.2f} px apart in height")
     if not abs(depth) <= WORST_DEPTH:
         said.append(f"boards kept out say that depth at {FAR} m is wrong by {100 * depth:+.0f} %")
-    elif not unsure <= WORST_DEPTH:
-        said.append(f"boards kept out leave the depth at {FAR} m unsure by {100 * unsure:.0f} %: show more")
+    elif not abs(depth) + 2 * unsure <= WORST_DEPTH:
+        said.append(f"boards kept out leave the depth at {FAR} m unsure by {200 * unsure:.0f} %: show more")
     for place, truth in places:
         if not abs(place - truth) <= WORST_DEPTH * truth:
             said.append(f"a board at {truth:.2f} m is seen at {place:.2f} m")

@@ -63,7 +63,7 @@ class Shown(NamedTuple):
 
 def shown_boards(
     cameras: StereoCameras, board: Chessboard, rng: np.random.Generator, *, noise: float = 3.0,
-    near: float = 0.25, far: float = 0.65, tilt: float = 0.7, moved: float = 0.0,
+    near: float = 0.25, far: float = 0.65, tilt: float = 0.7, spread: float = 0.8, moved: float = 0.0,
 ) -> Iterator[Shown]:  # fmt: skip
     """Boards in random poses, without end; not all of them are wholly seen.
 
@@ -74,13 +74,14 @@ def shown_boards(
         noise: standard deviation of a pixel's brightness, of 255.
         near, far: distances [m].
         tilt: about two axes, at most so much each way; half of it about the line of sight [rad].
+        spread: share of the picture's width and height over which the boards' middles lie.
         moved: between the two exposures, sideways and down, at most so much each way [m].
     """
     painters = BoardPainter(cameras.left, board), BoardPainter(cameras.right, board)
     middle = board.points.mean(axis=0)
     width, height = cameras.left.width, cameras.left.height
     while True:
-        pixel = np.array([rng.uniform(0.1, 0.9) * width, rng.uniform(0.1, 0.9) * height])
+        pixel = (0.5 + spread * rng.uniform(-0.5, 0.5, 2)) * (width, height)
         distance = rng.uniform(near, far)
         centre = np.append((pixel - (width, height) * np.array(0.5)) / cameras.left.fx, 1.0) * distance
         turn = _turned(*(rng.uniform(-1, 1, 3) * (tilt, tilt, tilt / 2)))

@@ -58,8 +58,8 @@ def was_rectified(
     expected = earlier or made
     black = min(_overlap(left, expected.left), _overlap(right, expected.right))
     if np.isfinite(as_it_is) and np.isfinite(once_more):
-        return Verdict(as_it_is < once_more, as_it_is, once_more, black)
-    return Verdict(None if np.isnan(black) else black > 0.9, as_it_is, once_more, black)
+        return Verdict(bool(as_it_is < once_more), as_it_is, once_more, black)
+    return Verdict(None if np.isnan(black) else bool(black > 0.9), as_it_is, once_more, black)
 
 
 class Ready(NamedTuple):

@@ -214,9 +214,13 @@ def _matrix(facts: Mapping[Any, Any], name: str, shape: tuple[int, ...] | None, 
     told = facts.get(name)
     try:
         if isinstance(told, dict):
-            values = np.asarray(told["data"], dtype=float).reshape(int(told["rows"]), int(told["cols"]))
+            values = np.array(_numbers(told["data"])).reshape(int(told["rows"]), int(told["cols"]))
         else:
-            values = np.asarray(told, dtype=float)
+            values = np.array(
+                [_numbers(row) for row in told[:5]]
+                if isinstance(told, list) and told and isinstance(told[0], list)
+                else _numbers(told)
+            )
     except (KeyError, TypeError, ValueError, OverflowError):
         values = np.array(np.nan)
     if values.size == 0 or values.size > 16 or (shape is not None and values.shape != shape):
@@ -225,6 +229,13 @@ def _matrix(facts: Mapping[Any, Any], name: str, shape: tuple[int, ...] | None, 
         size = "numbers" if shape is None else " x ".join(map(str, shape)) + " numbers"
         raise BadInput(f"its {name} is no {size}", where=str(path), remedy=_REMEDY)
     return values
+
+
+def _numbers(told: Any) -> list[float]:
+    """A short list of numbers; anything longer or deeper, which YAML's references may make endless, is none."""
+    if not isinstance(told, list) or len(told) > 16 or not all(isinstance(value, int | float) for value in told):
+        raise ValueError("no numbers")
+    return [float(value) for value in told]
 
 
 def _whole(facts: Mapping[Any, Any], name: str, path: Path) -> int:
