@@ -48,9 +48,9 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     ("word", "line"),
     [
         ("raech", "toddle: no command named 'raech'; did you mean reach?"),
-        ("zzz", "toddle: no command named 'zzz'; known: doctor, experiment, reach, walk"),
+        ("zzz", "toddle: no command named 'zzz'; known: doctor, experiment, navigate, reach, see, walk"),
         ("--verison", "toddle: no option named '--verison'; did you mean --version?"),
-        ("", "toddle: no command named ''; known: doctor, experiment, reach, walk"),
+        ("", "toddle: no command named ''; known: doctor, experiment, navigate, reach, see, walk"),
     ],
 )
 def test_an_unknown_word_is_answered_with_the_nearest(word: str, line: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -17,11 +17,19 @@ import yaml
 from toddle.failures import BadInput
 from toddle.geometry.camera import Pinhole, RectifiedCameras, StereoCameras
 from toddle.outside.files import write_bytes
+from toddle.outside.seeing.camera_numbers import (
+    REMEDY,
+    camera_from,
+    matrix_of,
+    pixels_from,
+    read_facts,
+    rotation_from,
+    size_of,
+    turn_of,
+)
 from toddle.see.rectify import Rectification, maps_of
 
-_LARGEST = 2**20  # bytes; a camera is a few kilobytes
 _FARTHEST = 10.0  # m between two cameras
-_REMEDY = "give a ROS camera_info pair, OpenCV's K1 D1 K2 D2 R T, or a Kalibr camchain of two cameras"
 
 
 class CameraFile(NamedTuple):
@@ -37,19 +45,6 @@ class CameraFile(NamedTuple):
     earlier: Rectification | None = None
 
 
-class _Loader(yaml.SafeLoader):
-    """Plain YAML, and OpenCV's matrices."""
-
-
-def _opencv_matrix(loader: yaml.SafeLoader, node: yaml.Node) -> Any:
-    if not isinstance(node, yaml.MappingNode):
-        raise yaml.constructor.ConstructorError(None, None, "a matrix that is none", node.start_mark)
-    return loader.construct_mapping(node, deep=True)
-
-
-_Loader.add_constructor("tag:yaml.org,2002:opencv-matrix", _opencv_matrix)
-
-
 def read_cameras(path: Path, size: tuple[int, int] | None = None) -> CameraFile:
     """Read two cameras.
 
@@ -62,16 +57,16 @@ def read_cameras(path: Path, size: tuple[int, int] | None = None) -> CameraFile:
     """
     if path.is_dir():
         path = path / "left.yaml"
-    facts = _facts(path)
+    facts = read_facts(path)
     if "cam0" in facts:
         found = _kalibr(facts, path)
     elif "camera_matrix" in facts and "projection_matrix" in facts:
         left, right = _ros_pair(path)
-        found = _ros(_facts(left), left, _facts(right), right)
+        found = _ros(read_facts(left), left, read_facts(right), right)
     elif {"K1", "K2"} <= facts.keys() or {"M1", "M2"} <= facts.keys():
         found = _opencv(facts, path, size)
     else:
-        raise BadInput("it holds no pair of cameras", where=str(path), remedy=_REMEDY)
+        raise BadInput("it holds no pair of cameras", where=str(path), remedy=REMEDY)
     _check_pair(found.cameras, path)
     if size is not None and size != (found.cameras.left.width, found.cameras.left.height):
         said = f"{found.cameras.left.width} x {found.cameras.left.height}"
@@ -107,26 +102,6 @@ def _written(matrix: np.ndarray) -> dict[str, Any]:
     return {"rows": rows, "cols": columns, "data": [float(value) for value in matrix.ravel()]}
 
 
-def _facts(path: Path) -> dict[Any, Any]:
-    """A YAML mapping, OpenCV's dialect included."""
-    try:
-        if not path.is_file():
-            raise BadInput("there is no such file", where=str(path), remedy=_REMEDY)
-        if path.stat().st_size > _LARGEST:
-            raise BadInput("it is larger than any camera", where=str(path), remedy=_REMEDY)
-        text = path.read_bytes().decode("utf-8")
-        if text.startswith("%YAML:"):  # OpenCV's head is no YAML
-            text = text.partition("\n")[2]
-        facts = yaml.load(text, Loader=_Loader)  # a SafeLoader: it builds nothing but plain values
-    except OSError as fault:
-        raise BadInput(f"it can't be read ({fault.strerror})", where=str(path), remedy=_REMEDY) from fault
-    except (yaml.YAMLError, ValueError, TypeError, RecursionError) as fault:
-        raise BadInput("it is no YAML", where=str(path), remedy=_REMEDY) from fault
-    if not isinstance(facts, dict):
-        raise BadInput("it holds no cameras", where=str(path), remedy=_REMEDY)
-    return facts
-
-
 def _ros_pair(path: Path) -> tuple[Path, Path]:
     for mine, other in (("left", "right"), ("Left", "Right")):
         if mine in path.name:
@@ -142,11 +117,11 @@ def _ros(one: Mapping[Any, Any], left: Path, other: Mapping[Any, Any], right: Pa
         model = facts.get("distortion_model", "plumb_bob")
         if model != "plumb_bob":
             raise BadInput(f"its distortion_model is {str(model)[:40]!r}", where=str(path), remedy="give plumb_bob")
-        size = (_whole(facts, "image_width", path), _whole(facts, "image_height", path))
-        bend = _matrix(facts, "distortion_coefficients", None, path).ravel()
-        pair.append(_pinhole(_matrix(facts, "camera_matrix", (3, 3), path), bend, size, path))
-        turns.append(_turn(facts, "rectification_matrix", path))
-        projections.append(_matrix(facts, "projection_matrix", (3, 4), path))
+        size = (size_of(facts, "image_width", path), size_of(facts, "image_height", path))
+        bend = matrix_of(facts, "distortion_coefficients", None, path).ravel()
+        pair.append(camera_from(matrix_of(facts, "camera_matrix", (3, 3), path), bend, size, path))
+        turns.append(turn_of(facts, "rectification_matrix", path))
+        projections.append(matrix_of(facts, "projection_matrix", (3, 4), path))
     focal, shift = projections[1][0, 0], projections[1][0, 3]
     if focal <= 0 or shift >= 0:
         what = "its projection_matrix has no baseline"
@@ -158,22 +133,26 @@ def _ros(one: Mapping[Any, Any], left: Path, other: Mapping[Any, Any], right: Pa
 
 def _opencv(facts: Mapping[Any, Any], path: Path, size: tuple[int, int] | None) -> CameraFile:
     if "image_width" in facts and "image_height" in facts:
-        size = (_whole(facts, "image_width", path), _whole(facts, "image_height", path))
+        size = (size_of(facts, "image_width", path), size_of(facts, "image_height", path))
     if size is None:
         raise BadInput("it does not say how large the pictures are", where=str(path), remedy="give pictures with it")
     letter = "K" if "K1" in facts else "M"
     left, right = (
-        _pinhole(_matrix(facts, f"{letter}{n}", (3, 3), path), _matrix(facts, f"D{n}", None, path).ravel(), size, path)
+        camera_from(
+            matrix_of(facts, f"{letter}{n}", (3, 3), path), matrix_of(facts, f"D{n}", None, path).ravel(), size, path
+        )
         for n in (1, 2)
     )
-    translation = _matrix(facts, "T", None, path).ravel()
+    translation = matrix_of(facts, "T", None, path).ravel()
     if translation.shape != (3,):
-        raise BadInput("its T has not three numbers", where=str(path), remedy=_REMEDY)
-    cameras = StereoCameras(left, right, _turn(facts, "R", path), translation)
+        raise BadInput("its T has not three numbers", where=str(path), remedy=REMEDY)
+    cameras = StereoCameras(left, right, turn_of(facts, "R", path), translation)
     if not {"R1", "R2", "P1", "P2"} <= facts.keys():
         return CameraFile(cameras)
-    turns = [_turn(facts, name, path) for name in ("R1", "R2")]
-    return CameraFile(cameras, _earlier(cameras, turns, [_matrix(facts, name, (3, 4), path) for name in ("P1", "P2")]))
+    turns = [turn_of(facts, name, path) for name in ("R1", "R2")]
+    return CameraFile(
+        cameras, _earlier(cameras, turns, [matrix_of(facts, name, (3, 4), path) for name in ("P1", "P2")])
+    )
 
 
 def _earlier(
@@ -195,86 +174,18 @@ def _kalibr(facts: Mapping[Any, Any], path: Path) -> CameraFile:
     for name in ("cam0", "cam1"):
         one = facts.get(name)
         if not isinstance(one, dict):
-            raise BadInput(f"it holds no {name}", where=str(path), remedy=_REMEDY)
+            raise BadInput(f"it holds no {name}", where=str(path), remedy=REMEDY)
         models = (one.get("camera_model", "pinhole"), one.get("distortion_model", "radtan"))
         if models != ("pinhole", "radtan"):
             what = f"its {name} is {str(models[0])[:40]} with {str(models[1])[:40]} distortion"
             raise BadInput(what, where=str(path), remedy="give pinhole-radtan")
-        size = _matrix(one, "resolution", (2,), path)
-        fx, fy, cx, cy = _matrix(one, "intrinsics", (4,), path)
+        size = matrix_of(one, "resolution", (2,), path)
+        fx, fy, cx, cy = matrix_of(one, "intrinsics", (4,), path)
         matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
-        whole = (_integer(size[0], "resolution", path), _integer(size[1], "resolution", path))
-        pair.append(_pinhole(matrix, _matrix(one, "distortion_coeffs", None, path).ravel(), whole, path))
-    moved = _matrix(facts["cam1"], "T_cn_cnm1", (4, 4), path)
-    return CameraFile(StereoCameras(pair[0], pair[1], _rotation(moved[:3, :3], "T_cn_cnm1", path), moved[:3, 3]))
-
-
-def _matrix(facts: Mapping[Any, Any], name: str, shape: tuple[int, ...] | None, path: Path) -> np.ndarray:
-    """A matrix as OpenCV and ROS (rows, cols, data) or as Kalibr (lists) write it."""
-    told = facts.get(name)
-    try:
-        if isinstance(told, dict):
-            values = np.array(_numbers(told["data"])).reshape(int(told["rows"]), int(told["cols"]))
-        else:
-            values = np.array(
-                [_numbers(row) for row in told[:5]]
-                if isinstance(told, list) and told and isinstance(told[0], list)
-                else _numbers(told)
-            )
-    except (KeyError, TypeError, ValueError, OverflowError):
-        values = np.array(np.nan)
-    if values.size == 0 or values.size > 16 or (shape is not None and values.shape != shape):
-        values = np.array(np.nan)
-    if not np.isfinite(values).all():
-        size = "numbers" if shape is None else " x ".join(map(str, shape)) + " numbers"
-        raise BadInput(f"its {name} is no {size}", where=str(path), remedy=_REMEDY)
-    return values
-
-
-def _numbers(told: Any) -> list[float]:
-    """A short list of numbers; anything longer or deeper, which YAML's references may make endless, is none."""
-    if not isinstance(told, list) or len(told) > 16 or not all(isinstance(value, int | float) for value in told):
-        raise ValueError("no numbers")
-    return [float(value) for value in told]
-
-
-def _whole(facts: Mapping[Any, Any], name: str, path: Path) -> int:
-    return _integer(facts.get(name), name, path)
-
-
-def _integer(value: Any, name: str, path: Path) -> int:
-    try:
-        number = float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = 0.0
-    if number != number or not 1 <= number <= 65536 or number != round(number):
-        raise BadInput(f"its {name} is no size in pixels", where=str(path), remedy="give 1 to 65536")
-    return int(number)
-
-
-def _pinhole(matrix: np.ndarray, bend: np.ndarray, size: tuple[int, int], path: Path) -> Pinhole:
-    if len(bend) > 5 and np.any(bend[5:]):
-        what = f"its distortion has {len(bend)} coefficients"
-        raise BadInput(what, where=str(path), remedy="calibrate with five: k1 k2 p1 p2 k3")
-    k1, k2, p1, p2, k3 = (float(value) for value in [*bend, 0.0, 0.0, 0.0, 0.0, 0.0][:5])
-    fx, fy, cx, cy = (float(matrix[place]) for place in ((0, 0), (1, 1), (0, 2), (1, 2)))
-    if abs(matrix[0, 1]) > 1e-6 * abs(fx):
-        raise BadInput("its pixels are skew", where=str(path), remedy="calibrate without skew")
-    try:
-        return Pinhole(size[0], size[1], fx, fy, cx, cy, (k1, k2, p1, p2, k3))
-    except BadInput as fault:
-        raise BadInput(fault.what, where=str(path), remedy=fault.remedy) from fault
-
-
-def _turn(facts: Mapping[Any, Any], name: str, path: Path) -> np.ndarray:
-    return _rotation(_matrix(facts, name, (3, 3), path), name, path)
-
-
-def _rotation(matrix: np.ndarray, name: str, path: Path) -> np.ndarray:
-    if np.abs(matrix).max() > 2 or np.abs(matrix @ matrix.T - np.eye(3)).max() > 1e-3 or np.linalg.det(matrix) < 0:
-        raise BadInput(f"its {name} is no rotation", where=str(path), remedy=_REMEDY)
-    u, _, v = np.linalg.svd(matrix)  # written with six digits it is nearly one
-    return u @ v
+        whole = (pixels_from(size[0], "resolution", path), pixels_from(size[1], "resolution", path))
+        pair.append(camera_from(matrix, matrix_of(one, "distortion_coeffs", None, path).ravel(), whole, path))
+    moved = matrix_of(facts["cam1"], "T_cn_cnm1", (4, 4), path)
+    return CameraFile(StereoCameras(pair[0], pair[1], rotation_from(moved[:3, :3], "T_cn_cnm1", path), moved[:3, 3]))
 
 
 def _check_pair(cameras: StereoCameras, path: Path) -> None:
