@@ -13,7 +13,7 @@ from jaxtyping import Bool, UInt8
 
 from toddle.failures import BadInput
 from toddle.geometry.camera import RectifiedCameras
-from toddle.see.rectify import Maps, Rectification, rectify
+from toddle.see.rectify import Maps, Rectification, maps_from, rectify
 from toddle.see.straighten import (
     FEWEST,
     Misalignment,
@@ -130,7 +130,7 @@ def make_ready(
         both = level if maps[1] is None else both_in_one(maps[1], level)
         maps = (maps[0], both)
         straight = rectify(both, right)
-        shown = both_in_one(Maps(level.source, seen[1]), level).valid if before else both.valid
+        shown = both_in_one(maps_from(level.source, seen[1]), level).valid if before else both.valid
         pair, seen = (pair[0], straight), (seen[0], shown)
     return Ready(pair[0], pair[1], seen, used.cameras, verdict, off, worth, maps, tuple(trouble))
 

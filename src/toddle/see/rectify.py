@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Shaped
+from jaxtyping import Bool, Float, Float32, Int16, Shaped, UInt16
 
 from toddle.failures import BadInput
 from toddle.geometry.camera import Pinhole, RectifiedCameras, StereoCameras
@@ -27,10 +27,12 @@ class Maps(NamedTuple):
     Attributes:
         source: x and y [pixels].
         valid: the camera saw it.
+        quick: the same for OpenCV, whole pixels and 32nds, twice as fast; what was not seen is looked up outside.
     """
 
     source: Float32[np.ndarray, "rows columns 2"]
     valid: Bool[np.ndarray, "rows columns"]
+    quick: tuple[Int16[np.ndarray, "rows columns 2"], UInt16[np.ndarray, "rows columns"]]
 
 
 class Rectification(NamedTuple):
@@ -70,13 +72,20 @@ def rectification(cameras: StereoCameras, camera: Pinhole | None = None) -> Rect
     return Rectification(maps[0], maps[1], (first, second), RectifiedCameras(ideal, cameras.baseline))
 
 
+def maps_from(source: Float32[np.ndarray, "rows columns 2"], valid: Bool[np.ndarray, "rows columns"]) -> Maps:
+    """Maps, made ready for use: where each pixel is found [pixels], and whether the camera saw it."""
+    outside = np.where(valid[..., None], source, np.float32(-100.0))
+    whole, parts = cv2.convertMaps(outside, None, cv2.CV_16SC2)  # type: ignore[call-overload]
+    return Maps(source, valid, (whole, parts))
+
+
 def maps_of(camera: Pinhole, rotation: Float[np.ndarray, "3 3"], ideal: Pinhole) -> Maps:
     """The maps of one camera: for each pixel of the ideal camera, where its ray is seen (equations 2.143 to 2.145)."""
     bend = np.array(camera.distortion)
     size = (ideal.width, ideal.height)
     x, y = cv2.initUndistortRectifyMap(camera.matrix, bend, rotation, ideal.matrix, size, cv2.CV_32FC1)
     source = np.stack([x, y], axis=-1)
-    return Maps(source, _seen(camera, rotation, ideal, source))
+    return maps_from(source, _seen(camera, rotation, ideal, source))
 
 
 def _seen(
@@ -99,9 +108,7 @@ def rectify(
         maps: of the camera that took it.
         picture: 8 bits or floating point, grey or coloured.
     """
-    seen = cv2.remap(picture, maps.source, None, cv2.INTER_LINEAR)  # type: ignore[call-overload]
-    seen[~maps.valid] = 0
-    return seen
+    return cv2.remap(picture, maps.quick[0], maps.quick[1], cv2.INTER_LINEAR)
 
 
 def rectified_points(

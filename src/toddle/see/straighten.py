@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Shaped, UInt8
 
-from toddle.see.rectify import Maps
+from toddle.see.rectify import Maps, maps_from
 
 FEWEST = 20
 """Matches, less than which say nothing."""
@@ -127,14 +127,14 @@ def straightening(off: Misalignment, size: tuple[int, int]) -> Maps:
     lower = (_basis(flat, size) @ (off.shift, off.slope_across, off.slope_down)).reshape(height, width)
     source = np.stack([columns, rows + lower], axis=-1)
     valid = (source[..., 1] >= 0) & (source[..., 1] <= height - 1)
-    return Maps(source.astype(np.float32), valid)
+    return maps_from(source.astype(np.float32), valid)
 
 
 def both_in_one(first: Maps, then: Maps) -> Maps:
     """One look-up instead of two: pictures go through `first`, then through `then`."""
     source = cv2.remap(first.source, then.source, None, cv2.INTER_LINEAR)  # type: ignore[call-overload]
     inside = cv2.remap(first.valid.astype(np.float32), then.source, None, cv2.INTER_LINEAR)  # type: ignore[call-overload]
-    return Maps(source, then.valid & (inside > 0.999))
+    return maps_from(source, then.valid & (inside > 0.999))
 
 
 def grey(picture: UInt8[np.ndarray, "rows columns *colours"]) -> UInt8[np.ndarray, "rows columns"]:
