@@ -65,7 +65,7 @@ class Camera:
         self._scene = mujoco.MjvScene(simulation.model, maxgeom=_GEOMS)
         self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW.value] = shadows
         self._options, self._mouse = mujoco.MjvOption(), mujoco.MjvPerturb()
-        self._gl, self._context = _drawing(simulation.model, width, height)
+        self._gl, self._context = drawing(simulation.model, width, height)
 
     def picture(self, footprints: Sequence[Footstep] = ()) -> UInt8[np.ndarray, "height width 3"]:
         """The simulation as it is now.
@@ -135,7 +135,7 @@ def _camera(simulation: HumanoidSimulation, view: str) -> mujoco.MjvCamera:
     return camera
 
 
-def _drawing(model: mujoco.MjModel, width: int, height: int) -> tuple[Any, Any]:
+def drawing(model: mujoco.MjModel, width: int, height: int) -> tuple[Any, Any]:
     """An OpenGL context and MuJoCo's; without a screen, and nothing said, that is EGL."""
     headless = sys.platform == "linux" and not any(os.environ.get(name) for name in ("MUJOCO_GL", "DISPLAY"))
     try:
