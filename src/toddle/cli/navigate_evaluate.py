@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from toddle.outside.navigation.physics_batch import Recipe
 
 _PROG = "toddle navigate evaluate"
+_TOLD_ELSEWHERE = ("env", "stopped")
 _STAND_IN = "heicub"  # in physics, for who learned on wheels
 _MOST = {"episodes": 100_000, "jobs": 1024, "circles": 20, "people": 10}
 
@@ -249,7 +250,11 @@ def tell(figures: dict[str, Any], folder: Path, *, as_json: bool) -> None:
     if as_json:
         print(json.dumps(finite({**figures, "folder": str(folder)})))
         return
-    shown = [(name.replace("_", " "), _shown(value)) for name, value in figures.items() if value is not None]
+    shown = [
+        (name.replace("_", " "), _shown(value))
+        for name, value in figures.items()
+        if isinstance(value, str | int | float) and name not in _TOLD_ELSEWHERE
+    ]
     print_table(str(figures.get("env", "")), ("", "this run"), shown)
     print(f"figures and pictures: {folder}")
     sys.stdout.flush()

@@ -120,6 +120,8 @@ def learned(asked: Ppo, job: Job) -> Learned:
     from toddle.outside.navigation.named_tasks import make_task, source_from
     from toddle.outside.navigation.ppo_run import run
 
+    if asked.devices is not None:
+        _check_devices(asked.devices, job)
     task = make_task(source_from(job.source))
 
     def tried(policy: Policy, seed: int) -> dict[str, Any]:
@@ -131,6 +133,20 @@ def learned(asked: Ppo, job: Job) -> Learned:
 
     with _going_on(asked, job) as (plan, told):
         return Learned(run(task, job.config, plan, judge=marked, **told), tried, plan.folder)
+
+
+def _check_devices(devices: int, job: Job) -> None:
+    """Refuse devices that are not there, or that can't share the actors."""
+    import jax
+
+    there = jax.device_count()
+    if devices > there:
+        raise BadInput(f"there are {there}", where=f"--devices {devices}", remedy=f"give 1 to {there}")
+    if devices > 1 and (job.seeds > 1 or job.config.actors % devices):
+        what = (
+            "several seeds lie on one device" if job.seeds > 1 else f"{job.config.actors} actors can't be shared evenly"
+        )
+        raise BadInput(what, where=f"--devices {devices}", remedy="leave it out, or change --seeds and --actors")
 
 
 def _learned_gym(asked: Ppo, job: Job) -> Learned:
@@ -163,8 +179,9 @@ def _going_on(asked: Ppo, job: Job) -> Iterator[tuple[Plan, dict[str, Any]]]:
     name = job.name.replace("/", "-")
     with left_folder(asked.out, name) if job.resumed is None else nullcontext(job.resumed) as folder:
         plan = Plan(
-            folder, job.name, job.source, job.seed, job.seeds, _saved_every(config), max(config.updates // 8, 1)
-        )
+            folder, job.name, job.source, job.seed, job.seeds, _saved_every(config), max(config.updates // 8, 1),
+            asked.devices or 1,
+        )  # fmt: skip
         with stoppable() as stop, Reporter(f"{job.name}, steps", total, quiet=asked.json) as reporter:
             facts = {"source": dict(job.source), "seed": job.seed, "seeds": job.seeds, "ppo": asdict(config)}
             write_json(folder / "config.json", {**facts, "versions": versions()})

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from toddle.cli.arguments import parse
-from toddle.cli.navigate_folder import refuse_used
+from toddle.cli.navigate_folder import RUN, refuse_used
 from toddle.cli.navigate_learning import NUMBERS, PROG, UNSEEN, job_of, learned
 from toddle.cli.options import POSITIONAL
 from toddle.failures import BadInput
@@ -23,7 +23,7 @@ _STOPPED = 130
 _TASKS = ("robot", "config", "circles", "people", "sideways", "pace", "solver")
 _MOST = {
     "steps": 2**40, "actors": 2**20, "horizon": 2**20, "minibatch": 2**24, "epochs": 1000, "memory": 4096,
-    "sequence": 2**20, "episodes": 100_000, "seeds": 256, "seed": UNSEEN - 1,
+    "sequence": 2**20, "episodes": 100_000, "seeds": 256, "seed": UNSEEN - 1, "devices": 4096,
 }  # fmt: skip
 _WIDEST = 2**14  # layer
 
@@ -48,6 +48,7 @@ class Ppo:
         solver: of the walking pattern: native (this machine's cores), batch (accelerators) or auto.
         seed: of all randomness; 0 unless given.
         seeds: so many runs side by side, each with the next seed; 1 unless given.
+        devices: so many share the actors, such as several graphics cards.
         steps: to train for.
         actors: copies of the task side by side (N).
         horizon: steps of each between two updates (T).
@@ -84,6 +85,7 @@ class Ppo:
     solver: Literal["native", "batch", "auto"] | None = None
     seed: int | None = None
     seeds: int | None = None
+    devices: int | None = None
     steps: int | None = None
     actors: int | None = None
     horizon: int | None = None
@@ -139,6 +141,8 @@ def _check(asked: Ppo) -> None:
         raise BadInput("a Gymnasium environment knows no such thing", where=f"--{useless[0]}", remedy="leave it out")
     if asked.env is not None and (asked.seeds or 1) > 1:
         raise BadInput("an environment is learned one seed at a time", where="--seeds", remedy="leave it out")
+    if asked.env is not None and asked.devices is not None:
+        raise BadInput("an environment is stepped on the host", where="--devices", remedy="leave it out")
     for name, most in _MOST.items():
         value, least = getattr(asked, name), 0 if name in ("memory", "seed") else 1
         if value is not None and not least <= value <= most:
@@ -183,5 +187,6 @@ def _over_seeds(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 def _remedy(run: Run, folder: Path) -> str:
     if run.diverged:
-        return f"the last good policy and checkpoint are in {folder}"
+        kept = "policy and checkpoint are" if (folder / RUN).exists() else "policy is"
+        return f"the last good {kept} in {folder}"
     return f"go on with {PROG} --resume {folder}"

@@ -43,6 +43,11 @@ def walk_in_physics(asked: Walk) -> int:
     from toddle.robots.humanoids import load_humanoid
 
     spec = asked.robot or DEFAULT_ROBOT
+    if asked.policy is not None:
+        from toddle.outside.navigation.policy_files import load_policy
+        from toddle.outside.navigation.steered import walking_source
+
+        _ = walking_source(load_policy(asked.policy), asked.policy)  # refused before anything is told
     document = _document_gait(asked, spec)
     humanoid = load_humanoid(spec, asked.config)
     for note in humanoid.notes:
