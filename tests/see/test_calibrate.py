@@ -85,7 +85,7 @@ def painted() -> tuple[StereoCameras, Calibration]:
     rng = np.random.default_rng(3)
     cameras = misaligned(rng)
     views: list[View] = []
-    for shown in shown_boards(cameras, BOARD, rng):
+    for shown in shown_boards(cameras, BOARD, rng, spread=0.6):
         found = sight(f"board{len(views)}", shown.left, shown.right, BOARD)
         if not isinstance(found, Dropped):
             views.append(found.view)

@@ -174,7 +174,7 @@ def _tell(figures: dict[str, Any], folder: Path, file: Path, *, as_json: bool) -
     rows = [[name.replace("_", " "), shown(value)] for name, value in figures.items() if name != "dropped"]
     print_table("two cameras", ("", "this calibration"), rows)
     for name, why in figures["dropped"].items():
-        print(f"dropped {name}: {why}")
+        print(f"dropped {ascii(name)[1:-1]}: {why}")  # a file's name may hold anything
     print(f"cameras, figures and pictures: {folder}")
     print(f"go on: toddle see rectify LEFT RIGHT --cameras {file}")
 
