@@ -26,7 +26,7 @@ COMMANDS = {
     "reach": "an arm learns to reach, and is asked to",
     "walk": "a humanoid walks, by itself or under your keys",
     "navigate": "the humanoid learns to find its way",
-    "see": "from the pictures of two cameras to depth",
+    "see": "two cameras, calibrated and rectified",
     "experiment": "a document's table or figure, ours beside theirs",
     "doctor": "what this machine has, and lacks",
 }

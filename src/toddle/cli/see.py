@@ -1,4 +1,4 @@
-"""``toddle see``: from the pictures of two cameras to depth. Each kind of work has a module of its own."""
+"""``toddle see``: two cameras, calibrated and rectified. Each kind of work has a module of its own."""
 
 from __future__ import annotations
 
@@ -10,14 +10,12 @@ from toddle.failures import BadInput, unknown_name
 WORK = {
     "calibrate": "two cameras, from pictures of a chessboard",
     "rectify": "a pair of pictures: the same thing in the same row of both",
-    "depth": "how far things are, from a pair of pictures",
 }
 
 _PROG = "toddle see"
 _EXAMPLES = """\
   toddle see calibrate left/ right/                cameras from two folders of chessboard pictures
-  toddle see rectify l.png r.png --cameras left.yaml
-  toddle see depth l.png r.png --cameras left.yaml"""
+  toddle see rectify l.png r.png --cameras left.yaml"""
 
 
 def main(argv: Sequence[str]) -> int:
@@ -35,6 +33,6 @@ def main(argv: Sequence[str]) -> int:
 def _help() -> str:
     works = "\n".join(f"  {name:<12}{what}" for name, what in WORK.items())
     return (
-        "See: from two pictures to depth.\n\n"
+        "See: two cameras, calibrated and rectified.\n\n"
         f"usage: {_PROG} WORK ...       ({_PROG} WORK --help tells more)\n\n{works}\n\n{_EXAMPLES}"
     )

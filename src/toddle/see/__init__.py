@@ -1,1 +1,1 @@
-"""From pictures to depth: calibration, rectification, disparity, and noticing that a camera can not be trusted."""
+"""From the pictures of two cameras towards depth: calibration, rectification, and what tells that they can be trusted."""
