@@ -1,1 +1,1 @@
-"""From the pictures of two cameras towards depth: calibration, rectification, and what tells that they can be trusted."""
+"""From the pictures of two cameras towards depth: calibration, rectification, and whether they can be trusted."""
