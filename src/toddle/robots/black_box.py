@@ -48,8 +48,7 @@ class CallablePlant:
             name: what to call it.
 
         Raises:
-            BadInput: no joints, names that repeat, limits that are not finite or not in order, home outside
-            them.
+            BadInput: no joints, names that repeat, limits that are not finite or not in order, home outside them.
         """
         self.name, self.joints = name, tuple(joints)
         if not self.joints or len(set(self.joints)) < len(self.joints):
@@ -75,8 +74,8 @@ class CallablePlant:
             What it answered: the tip position [m].
 
         Raises:
-            BadInput: q has the wrong shape, or is not finite. ToddleError: the callable raised (its exception
-            is the cause), or answered with something that is not a
+            BadInput: q has the wrong shape, or is not finite.
+            ToddleError: the callable raised (its exception is the cause), or answered with something that is not a
                 vector of finite numbers, or of another length than before.
         """
         command = np.clip(self._vector("q", q), self.lower, self.upper)

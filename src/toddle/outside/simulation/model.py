@@ -35,9 +35,9 @@ class ArmModel:
     """The compiled arm and how joint values become servo commands.
 
     Attributes:
-        model: MuJoCo's model, with one degree of freedom and one servo for each moving axis, in the chain's
-        order. gain: servo command for a unit of each joint. offset: servo command when all joints are zero
-        [rad or m].
+        model: MuJoCo's model, with one degree of freedom and one servo for each moving axis, in the chain's order.
+        gain: servo command for a unit of each joint.
+        offset: servo command when all joints are zero [rad or m].
     """
 
     model: mujoco.MjModel
