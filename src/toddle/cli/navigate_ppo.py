@@ -34,7 +34,8 @@ class Ppo:
 
     toddle navigate ppo teaches the humanoid to walk to goals; the real predictive controller runs in the loop, every
     iteration of it. A run leaves a folder with the policy, checkpoints, the learning curve, figures, and files for
-    TensorBoard. Ctrl-C ends it with what it has; --resume goes on bit for bit. The exit code is 1 where it diverged.
+    TensorBoard. Ctrl-C ends it with what it has; --resume goes on bit for bit, where Gymnasium's environments
+    begin anew. The exit code is 1 where it diverged.
 
     Attributes:
         task: point (the document's benchmark), goal (the walking robot), obstacles, people; goal unless given.
