@@ -17,7 +17,7 @@ _EPOCH = 10_000  # steps
 
 def games(
     path: Path,
-    panels: Mapping[str, Sequence[Float[np.ndarray, "steps 4"]]],
+    panels: Mapping[str, Sequence[Float[np.ndarray, "_ 4"]]],
     near: float,
     *,
     title: str,
