@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from toddle.navigate.scenarios.driver import drive
+from toddle.navigate.sight import Showing, Sight
 from toddle.navigate.tasks.scan import scan
 from toddle.navigate.tasks.walker import WalkerTask
 from toddle.signals import Circle, Velocity
@@ -34,6 +35,8 @@ class Situation(NamedTuple):
         goal: x, y [m].
         velocity: what the safety gate let through last.
         circles: obstacles that can be seen, people among them, where they are now.
+        sight: what the robot's cameras see; None: nobody looks.
+        showing: the truth beside it, for teachers; None where only the robot is asked.
     """
 
     t: float
@@ -41,6 +44,8 @@ class Situation(NamedTuple):
     goal: tuple[float, float]
     velocity: Velocity
     circles: tuple[Circle, ...] = ()
+    sight: Sight | None = None
+    showing: Showing | None = None
 
 
 @runtime_checkable
