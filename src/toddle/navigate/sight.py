@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Float32, Int, UInt8
 
+from toddle.navigate.scenarios.rooms import Hall
+
 ROWS, COLUMNS = 60, 80
 """Of the small picture that policies see (Huber 2019, figure 4.15)."""
 
@@ -33,8 +35,10 @@ class Showing(NamedTuple):
         place: x, y [m] and yaw [rad] of the waist.
         circles: x, y, radius [m] of the target, the other things and the people, where they are now.
         pixels: how many pixels of the small picture show each of these.
+        hall: the walls; None: nobody tells.
     """
 
     place: Float[np.ndarray, "3"]
     circles: Float[np.ndarray, "things 3"]
     pixels: Int[np.ndarray, " things"]
+    hall: Hall | None = None
