@@ -28,7 +28,7 @@ def drive(seed: int = 0, looks: int = 7, things: int = 5) -> Recording:
 def same(one: Recording, other: Recording) -> bool:
     """Bit for bit."""
     for mine, yours in zip(one, other, strict=True):
-        if isinstance(mine, np.ndarray):
+        if isinstance(mine, np.ndarray) and isinstance(yours, np.ndarray):
             if mine.dtype != yours.dtype or not np.array_equal(mine, yours):
                 return False
         elif mine != yours:
