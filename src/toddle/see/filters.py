@@ -8,7 +8,7 @@ the time.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import cv2
 import numpy as np
@@ -19,6 +19,7 @@ from toddle.see.matchers import Found, Grey
 _NOTHING = 1e-4  # smoothed confidence that tells nothing
 
 
+@runtime_checkable
 class Smoother(Protocol):
     """Fills in what a matcher left open."""
 

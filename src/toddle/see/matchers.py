@@ -8,7 +8,7 @@ from variance and left-right consistency (equations 2.134 to 2.138) or with a qu
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import cv2
 import numpy as np
@@ -37,6 +37,7 @@ class Found(NamedTuple):
     confidence: Float32[np.ndarray, "rows columns"]
 
 
+@runtime_checkable
 class Matcher(Protocol):
     """Finds disparities."""
 
