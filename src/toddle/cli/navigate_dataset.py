@@ -24,7 +24,7 @@ def tell(folder: Path, before: int, seconds: float, *, as_json: bool) -> None:
     Args:
         folder: of the dataset.
         before: episodes that it held before.
-        seconds: what the newer ones took [s].
+        seconds: what the newer ones took [s]; 0: that is of no interest.
         as_json: one JSON object, or a table.
     """
     from toddle.navigate.sight import PERIOD
@@ -39,8 +39,8 @@ def tell(folder: Path, before: int, seconds: float, *, as_json: bool) -> None:
             print(f"toddle: {fault.line}", file=sys.stderr)
     driven = sum(facts.looks for number, facts in found if number >= before) * PERIOD
     figures = {**_figures(folder, [facts for _, facts in found]), "recorded": len(episodes(folder)) - before}
-    if driven:
-        figures |= {"seconds": seconds, "real_time_factor": driven / max(seconds, 1e-9)}
+    if driven and seconds:
+        figures |= {"seconds": seconds, "real_time_factor": driven / seconds}
     _print(folder, figures, [facts for _, facts in found], as_json=as_json)
 
 

@@ -30,7 +30,8 @@ class Record:
     130 after Ctrl-C; with --show or --copy 1 if an episode is damaged.
 
     Attributes:
-        driver: who drives: the expert, who sees the truth; you.
+        driver: who drives: the expert, who sees the truth; you; a network, with the expert saying what it would do.
+        policy: the folder of the network, for --driver policy.
         scenario: which tasks, in turn; all six unless given.
         episodes: how many drives there are to be in the end, in all scenarios together.
         split: of the rooms: train, validation or test.
@@ -50,7 +51,8 @@ class Record:
         json: print one JSON object with the figures, and nothing else.
     """
 
-    driver: Literal["expert", "person"] = "expert"
+    driver: Literal["expert", "person", "policy"] = "expert"
+    policy: Path | None = None
     scenario: tuple[Literal["straight", "curve", "obstacle", "search", "person", "decoys"], ...] = (
         "straight", "curve", "obstacle", "search", "person", "decoys",
     )  # fmt: skip
@@ -85,6 +87,8 @@ def main(argv: Sequence[str]) -> int:
 
 def _check(asked: Record) -> None:
     """Refuse what contradicts itself before anything heavy is imported."""
+    if (asked.driver == "policy") != (asked.policy is not None):
+        raise BadInput("--driver policy and --policy belong together", where=_PROG, remedy="give both")
     if asked.show is not None and asked.copy is not None:
         raise BadInput("--show and --copy exclude each other", where=_PROG, remedy="give one")
     if asked.copy is not None and asked.out is None:
@@ -140,7 +144,12 @@ def _how(asked: Record) -> How:
     from toddle.outside.navigation.room_eyes import EyeOptions
 
     recipe = Recipe(expert, (), asked.robot, asked.config)
-    return How(recipe, asked.driver, asked.noise > 0, asked.noise, asked.anywhere, EyeOptions(asked.eyes))
+    if asked.policy is not None:
+        from toddle.outside.navigation.cloned import cloned
+
+        recipe = Recipe(cloned, (asked.policy,), asked.robot, asked.config)
+    taught = asked.driver == "policy" or asked.noise > 0
+    return How(recipe, asked.driver, taught, asked.noise, asked.anywhere, EyeOptions(asked.eyes))
 
 
 def _by_itself(asked: Record, how: How, left: Sequence[Errand], writer: Writer) -> tuple[float, bool]:
@@ -165,16 +174,16 @@ def _by_itself(asked: Record, how: How, left: Sequence[Errand], writer: Writer) 
         return time.monotonic() - began, stop.asked
 
 
-def _by_person(asked: Record, how: How, left: Sequence[Errand], writer: Writer) -> tuple[float, bool]:
-    """Drive by hand, a room after the other; how long it took [s], and whether it was interrupted by Ctrl-C."""
-    import time
+def _by_person(_: Record, how: How, left: Sequence[Errand], writer: Writer) -> tuple[float, bool]:
+    """Drive by hand, a room after the other; no time worth telling, and whether it was interrupted by Ctrl-C."""
+    from contextlib import closing
 
     from toddle.outside.dataset.by_hand import by_hand
 
-    began = time.monotonic()
     try:
-        for recording in by_hand(how, left):
-            writer.add(recording)
+        with closing(by_hand(how, left)) as recordings:
+            for recording in recordings:
+                writer.add(recording)
     except KeyboardInterrupt:
-        return time.monotonic() - began, True
-    return time.monotonic() - began, False
+        return 0.0, True
+    return 0.0, False

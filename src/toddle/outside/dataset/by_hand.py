@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 
 from toddle.navigate.cloning.recording import Recording
 from toddle.navigate.scenarios.draw_rooms import room
@@ -26,7 +26,7 @@ _ENDS = {
 }  # fmt: skip
 
 
-def by_hand(how: How, wanted: Sequence[Errand]) -> Iterator[Recording]:
+def by_hand(how: How, wanted: Sequence[Errand]) -> Generator[Recording, None, None]:
     """Every drive as it ends, until the person quits; a drive that was quit is none.
 
     Args:

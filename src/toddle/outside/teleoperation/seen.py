@@ -6,7 +6,6 @@ import contextlib
 import os
 import shutil
 import sys
-from typing import IO
 
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
@@ -24,14 +23,12 @@ _BEGIN, _END = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"
 class Seen:
     """A screen that shows what the robot sees; within ``with``, and the terminal is as before afterwards."""
 
-    def __init__(self, stream: IO[str] | None = None, *, full: bool | None = None) -> None:
-        """Made ready; nothing is shown yet.
+    def __init__(self, full: bool | None = None) -> None:
+        """Made ready; nothing is shown yet, and all of it on standard error.
 
         Args:
-            stream: where; standard error unless given.
             full: whether it shows 16 million colours, or 256; as the terminal says unless given.
         """
-        self._stream = stream or sys.stderr
         self._full = os.environ.get("COLORTERM") in ("truecolor", "24bit") if full is None else full
 
     def __enter__(self) -> Seen:
@@ -54,8 +51,8 @@ class Seen:
 
     def _write(self, text: str) -> None:
         with contextlib.suppress(OSError, ValueError):  # the terminal is gone; whoever reads the keys finds out
-            self._stream.write(text)
-            self._stream.flush()
+            sys.stderr.write(text)
+            sys.stderr.flush()
 
 
 def blocks(picture: UInt8[np.ndarray, "rows columns 3"], *, full: bool) -> list[str]:
