@@ -10,6 +10,7 @@ from toddle.failures import BadInput, unknown_name
 WORK = {
     "ppo": "a policy learns by trial and error, on top of the walker or on any Gymnasium environment",
     "record": "the expert, a person or a network drives through rooms, and it is kept as a dataset",
+    "clone": "a network learns to drive by what it sees, from drives that it watches",
     "evaluate": "a policy, a script or a person steers the robot in physics, and is judged",
     "export": "a policy as a file that answers without toddle",
 }

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float32, Int64, UInt8, UInt16
@@ -93,8 +93,7 @@ def streams(order: Order, episodes: Sequence[Episode], steps: int) -> tuple[Batc
         [np.concatenate([one[part][piece] for one, piece in pieces]) for pieces, _ in rows] for part in range(1, 6)
     ]
     fresh = np.stack([fresh for _, fresh in rows])
-    batch = Batch(*(np.stack(part) for part in taken), fresh, np.ones(fresh.shape, np.float32))  # pyright: ignore
-    return batch, order._replace(episode=numbers, at=at)
+    return _batch(taken, fresh, np.ones(fresh.shape, np.float32)), order._replace(episode=numbers, at=at)
 
 
 def windows(order: Order, episodes: Sequence[Episode], count: int, steps: int) -> tuple[Batch, Order]:
@@ -107,11 +106,20 @@ def windows(order: Order, episodes: Sequence[Episode], count: int, steps: int) -
         chosen.append((episodes[number], look - int(ends[number]) + len(episodes[number].picture)))
     back = np.arange(-steps + 1, 1)
     rows = [(one, np.maximum(at + back, 0)) for one, at in chosen]
-    taken = [np.stack([one[part][looks] for one, looks in rows]) for part in range(1, 6)]
+    taken = [[one[part][looks] for one, looks in rows] for part in range(1, 6)]
     starts = np.maximum(np.array([steps - 1 - at for _, at in chosen]), 0)
     fresh = np.arange(steps) <= starts[:, None]
     weight = np.broadcast_to(np.arange(steps) == steps - 1, fresh.shape).astype(np.float32)
-    return Batch(*taken, fresh, weight), order
+    return _batch(taken, fresh, weight), order
+
+
+def _batch(
+    taken: Sequence[Sequence[Any]],
+    fresh: Bool[np.ndarray, "streams steps"],
+    weight: Float32[np.ndarray, "streams steps"],
+) -> Batch:
+    picture, depth, felt, taught, labels = (np.stack(part) for part in taken)
+    return Batch(picture, depth, felt, taught, labels, fresh, weight)
 
 
 def _order(seed: int) -> Order:

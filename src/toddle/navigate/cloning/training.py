@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from toddle.navigate.cloning import batches
-from toddle.navigate.cloning.augment import Looks, augmented
+from toddle.navigate.cloning.augment import Circumstances, Looks, augmented, drawn
 from toddle.navigate.cloning.batches import Batch, Order
 from toddle.navigate.cloning.config import CloningConfig
 from toddle.navigate.cloning.episodes import Episode
@@ -58,6 +58,15 @@ class Training(NamedTuple):
     order: Order
 
 
+def blank(config: CloningConfig) -> Training:
+    """A run of this configuration that has seen nothing: its shapes are those of any other."""
+    net = network(config, jax.random.key(0))
+    memory = jnp.zeros((config.streams, 2, config.units), jnp.float32)
+    learner = Learner(net, at_rest(net), memory, jax.random.key(0, impl="rbg"))
+    scale = Scale(jnp.zeros(4, jnp.float32), jnp.ones(4, jnp.float32))
+    return Training(learner, scale, batches.windows_order(0))
+
+
 def begin(config: CloningConfig, episodes: Sequence[Episode], seed: int) -> Training:
     """A run before its first step; the scale is that of these episodes."""
     of_network, of_learning = jax.random.split(jax.random.key(seed))
@@ -79,7 +88,10 @@ def step(
 ) -> tuple[Training, Losses]:
     """One gradient step, with Adam at this rate."""
     batch, order = next_batch(training.order, config, episodes)
-    learner, told = _stepped(config, training.learner, training.scale, batch, jnp.float32(rate))
+    key, own = jax.random.split(training.learner.key)
+    under = drawn(config, *batch.fresh.shape, own)
+    learner = training.learner._replace(key=key)
+    learner, told = _stepped(config, learner, training.scale, batch, under, jnp.float32(rate))
     return Training(learner, training.scale, order), told
 
 
@@ -135,11 +147,15 @@ def _order(config: CloningConfig, episodes: Sequence[Episode], seed: int) -> Ord
 
 @partial(jax.jit, static_argnums=0)
 def _stepped(
-    config: CloningConfig, learner: Learner, scale: Scale, batch: Batch, rate: Float[Array, ""]
+    config: CloningConfig,
+    learner: Learner,
+    scale: Scale,
+    batch: Batch,
+    under: Circumstances,
+    rate: Float[Array, ""],
 ) -> tuple[Learner, Losses]:
     """One compiled step, augmentation and all."""
-    key, own = jax.random.split(learner.key)
-    given = _given(config, scale, batch, own)
+    given = _given(config, scale, batch, under)
     memory = jnp.zeros_like(learner.memory) if config.network == "document" else learner.memory
 
     def wrong(net: Network) -> tuple[Array, tuple[Losses, Array]]:
@@ -149,7 +165,7 @@ def _stepped(
     (_, (told, remembered)), gradient = jax.value_and_grad(wrong, has_aux=True)(learner.network)
     gradient, _ = shortened(gradient, config.gradient_norm)
     net, adam = moved(learner.network, learner.adam, gradient, rate)
-    return Learner(net, adam, remembered, key), told
+    return Learner(net, adam, remembered, learner.key), told
 
 
 @partial(jax.jit, static_argnums=0)
@@ -159,11 +175,11 @@ def _judged(
     return losses(net, memory, _given(config, scale, batch, None), config)
 
 
-def _given(config: CloningConfig, scale: Scale, batch: Batch, key: PRNGKeyArray | None) -> Given:
-    """A batch as the network is shown it, augmented if there is a key."""
+def _given(config: CloningConfig, scale: Scale, batch: Batch, under: Circumstances | None) -> Given:
+    """A batch as the network is shown it, under circumstances or as it is."""
     looks = Looks(_shares(batch.picture), _metres(batch.depth), jnp.asarray(batch.taught), jnp.asarray(batch.labels))
-    if key is not None:
-        looks = augmented(looks, config, key)
+    if under is not None:
+        looks = augmented(looks, config, under)
     seen = frames(looks.colours, looks.depth, scale)
     felt = felt_shares(jnp.asarray(batch.felt), config)
     return Given(seen, felt, looks.taught, looks.labels, jnp.asarray(batch.fresh), jnp.asarray(batch.weight))
@@ -175,9 +191,9 @@ def felt_shares(felt: Float[Array, "*rows 2"], config: CloningConfig) -> Float[A
     return felt / jnp.broadcast_to(greatest, felt.shape)
 
 
-def _shares(picture: Array) -> Array:
+def _shares(picture: Any) -> Array:
     return jnp.asarray(picture).astype(jnp.float32) / 255.0
 
 
-def _metres(depth: Array) -> Array:
+def _metres(depth: Any) -> Array:
     return jnp.asarray(depth).astype(jnp.float32) / 1000.0

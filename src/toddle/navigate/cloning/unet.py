@@ -46,10 +46,10 @@ class UNetEyes(eqx.Module):
         biases: of ``out`` and those layers.
     """
 
-    pairs: tuple[Pair, Pair, Pair, Pair, Pair]
+    pairs: tuple[Pair, ...]
     out: Float[Array, "1 1 _ _"]
-    weights: tuple[Float[Array, "_ _"], Float[Array, "_ _"]]
-    biases: tuple[Float[Array, " _"], Float[Array, " _"], Float[Array, " _"]]
+    weights: tuple[Float[Array, "_ _"], ...]
+    biases: tuple[Float[Array, " _"], ...]
 
     def __call__(self, frames: Float[Array, "looks 60 80 parts"]) -> Float[Array, "looks features"]:
         """Features of each look."""

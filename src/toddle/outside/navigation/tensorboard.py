@@ -61,6 +61,12 @@ class Board:
                     self._writer.add_scalar(tag, value, steps)
                 self._writer.add_scalar("speed/steps_per_second", steps_per_second, steps)
 
+    def scalars(self, values: Mapping[str, float], steps: int) -> None:
+        """Numbers by their tags, after so many steps; what isn't finite can't be drawn."""
+        for tag, value in values.items():
+            if math.isfinite(value):
+                self._writer.add_scalar(tag, value, steps)
+
 
 def _scalars(rows: Mapping[str, np.ndarray], row: int) -> dict[str, float]:
     """Of one update; what isn't finite can't be drawn."""
