@@ -31,6 +31,7 @@ from toddle.outside.dataset.rows import Damaged
 from toddle.outside.navigation.physics_batch import Recipe
 from toddle.outside.navigation.room_eyes import EyeOptions
 from toddle.outside.navigation.room_run import RoomRules, run_room
+from toddle.outside.orphans import end_with_parent
 from toddle.robots.humanoid import Humanoid
 from toddle.robots.humanoids import load_humanoid
 from toddle.walk.walker import walker
@@ -197,6 +198,7 @@ _own: list[Rider] = []  # and made of it
 
 def _begin(how: How) -> None:
     _ = signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started the processes hears it, and asks them to stop
+    end_with_parent()
     _told.append(how)
 
 
