@@ -1,6 +1,6 @@
 """What keeping a drive costs: bytes, time, and what other codecs would make of the pictures.
 
-    toddle navigate record --episodes 18 --noise 0.5 --anywhere 0.3 --out runs/drives
+    toddle navigate record --episodes 18 --noise 0.5 --anywhere 0.3 --seed 0 --out runs/drives
     python -m benchmarks.navigation.dataset runs/drives --out benchmarks/results/navigation_dataset.json
 
 Every codec gets the pictures of all episodes, as many files as there are episodes, and is read back by OpenCV. PSNR is
@@ -28,6 +28,8 @@ from toddle.outside.dataset.pictures import millimetres, png, read_video
 from toddle.outside.dataset.reader import read_dataset
 from toddle.outside.dataset.writer import Writer
 from toddle.outside.versions import versions
+
+RECORDED = "toddle navigate record --episodes 18 --noise 0.5 --anywhere 0.3 --seed 0 --out runs/drives"
 
 CODECS = {
     "H.264 RGB, no loss (ours)": ("libx264rgb", "rgb24", "-qp 0 -preset veryfast -g 10 -bf 0"),
@@ -112,14 +114,14 @@ def main() -> None:
     """Measure, print and keep."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--episodes", type=int, default=300)
+    parser.add_argument("--episodes", type=int, default=200)
     parser.add_argument("--out", type=Path)
     asked = parser.parse_args()
     recordings = [one for _, one in read_dataset(asked.folder, lambda fault: None)]
     depth = [len(png(one)) for recording in recordings for one in millimetres(recording.depth)]
     with tempfile.TemporaryDirectory() as folder:
         result = {
-            "command": f"python -m benchmarks.navigation.dataset FOLDER --episodes {asked.episodes}",
+            "command": f"{RECORDED} && python -m benchmarks.navigation.dataset runs/drives --episodes {asked.episodes}",
             "source": {"episodes": len(recordings), "looks": len(depth)},
             "codecs": codecs(recordings, Path(folder)),
             "depth_png_bytes_per_look": float(np.mean(depth)),
