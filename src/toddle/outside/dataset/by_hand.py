@@ -8,7 +8,7 @@ from toddle.navigate.cloning.recording import Recording
 from toddle.navigate.scenarios.draw_rooms import room
 from toddle.navigate.task import Outcome
 from toddle.outside.dataset import layout
-from toddle.outside.dataset.drives import Errand, How
+from toddle.outside.dataset.drives import Errand, How, start_of
 from toddle.outside.navigation.room_run import run_room
 from toddle.outside.simulation.disturbances import WorldOptions
 from toddle.outside.simulation.humanoid import HumanoidSimulation
@@ -45,9 +45,11 @@ def by_hand(how: How, wanted: Sequence[Errand]) -> Generator[Recording, None, No
             key = errand.room
             order = f"{said} {number} of {len(wanted)}: {layout.ORDERS[key.scenario]} Stop there.".strip()
             keyboard.velocity = STILL
+            place = room(key.scenario, key.split, key.number, key.style)
             finish, recording = run_room(
-                humanoid, Person(keyboard, seen, order), room(key.scenario, key.split, key.number, key.style),
-                seed=errand.seed, eyes=how.eyes, called=how.called, rules=how.rules, before=legs,
+                humanoid, Person(keyboard, seen, order), place, seed=errand.seed,
+                start=start_of(errand, place, how.anywhere), eyes=how.eyes, called=how.called, rules=how.rules,
+                before=legs,
             )  # fmt: skip
             if keyboard.ended:
                 return

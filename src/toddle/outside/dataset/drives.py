@@ -24,8 +24,8 @@ from toddle.navigate.cloning.noisy import Noisy
 from toddle.navigate.cloning.recording import Recording, RoomKey
 from toddle.navigate.driver import Driver
 from toddle.navigate.scenarios import draw_rooms
-from toddle.navigate.scenarios.rooms import Scenario, Split, Style
-from toddle.navigate.scenarios.starts import DRAWN, some_start
+from toddle.navigate.scenarios.rooms import SCENARIOS, Room, Scenario, Split, Style
+from toddle.navigate.scenarios.starts import DRAWN, Start, some_start
 from toddle.outside.dataset.reader import episodes, facts_of
 from toddle.outside.dataset.rows import Damaged
 from toddle.outside.navigation.physics_batch import Recipe
@@ -106,6 +106,12 @@ def missing(folder: Path, wanted: Sequence[Errand], called: str) -> tuple[Errand
     return tuple(errand for errand in wanted if (called, errand) not in have)
 
 
+def start_of(errand: Errand, room: Room, anywhere: float) -> Start:
+    """Where a drive begins; in such a share of all, anywhere in the room."""
+    draw = np.random.default_rng([errand.seed, SCENARIOS.index(errand.room.scenario), 2])
+    return some_start(room, draw) if draw.random() < anywhere else DRAWN
+
+
 class Rider:
     """What a process keeps between drives."""
 
@@ -128,11 +134,9 @@ class Rider:
         """
         how, key = self._how, errand.room
         room = draw_rooms.room(key.scenario, key.split, key.number, key.style)
-        draw = np.random.default_rng([errand.seed, draw_rooms.SCENARIOS.index(key.scenario), 2])
-        start = some_start(room, draw) if draw.random() < how.anywhere else DRAWN
         driver: Driver = Noisy(self._driver, how.noise, errand.seed) if how.noise else self._driver
         _, recording = run_room(
-            self._humanoid, driver, room, seed=errand.seed, start=start, eyes=how.eyes,
+            self._humanoid, driver, room, seed=errand.seed, start=start_of(errand, room, how.anywhere), eyes=how.eyes,
             teacher=Expert() if how.taught else None, called=how.called, rules=how.rules, before=self._walker,
         )  # fmt: skip
         assert recording is not None
