@@ -34,7 +34,7 @@ types: .venv/.ready-to-develop ## check the types
 	$(call stage,types,$(BIN)/pyright)
 
 tests: .venv/.ready-to-develop ## run the tests and the examples
-	$(call stage,tests,$(BIN)/pytest -n $(WORKERS) --durations=10)
+	$(call stage,tests,$(BIN)/pytest -n $(WORKERS) --dist loadfile --durations=10)
 
 docs: .venv/.ready-to-develop ## build the documentation into site/
 	$(call stage,docs,$(BIN)/mkdocs build --strict --quiet)
