@@ -20,8 +20,9 @@ import pytest
 from drives import drive, same
 
 from toddle.cli import main
+from toddle.failures import BadInput
 from toddle.navigate.cloning.expert import Expert
-from toddle.navigate.cloning.recording import RoomKey
+from toddle.navigate.cloning.recording import Recording, RoomKey
 from toddle.navigate.task import Outcome
 from toddle.outside.dataset import layout
 from toddle.outside.dataset.drives import Errand, How, errands, expert, missing, record
@@ -59,30 +60,47 @@ def test_drives_go_through_the_scenarios_in_turn_and_are_not_driven_twice(tmp_pa
     assert missing(tmp_path, wanted, "expert") == (*wanted[:3], wanted[4])
 
 
-def test_a_drive_is_the_same_each_time_and_taught_by_the_expert() -> None:
-    how = How(Recipe(expert), "expert", True, 1.0, 0.0, EyeOptions("cast"), RoomRules(seconds=2.5))
-    wanted = errands(("search",), "train", "seen", 1, first=3)
-    ((errand, first),) = record(how, wanted, 1)
-    ((_, again),) = record(how, wanted, 1)
-    assert not isinstance(first, Exception)
-    assert not isinstance(again, Exception)
-    assert same(first, again)
-    assert first[:4] == (errand.room, "expert", errand.seed, Outcome.LATE)
-    jolted = (first.asked != first.taught).any(axis=1)
-    assert 0 < jolted.mean() < 0.8
-    assert (np.abs(first.taught) <= [Expert().fastest, 0.0, Expert().turning + 1e-9]).all()
+def test_two_processes_drive_as_one_does_and_a_room_that_there_is_not_ends_neither() -> None:
+    how = How(Recipe(expert), "expert", True, 1.0, 0.0, EyeOptions("cast"), RoomRules(seconds=2.0))
+    none, jolted = Errand(RoomKey("curve", "train", "unseen", 0), 0), Errand(RoomKey("search", "train", "seen", 3), 3)
+    alone, shared = dict(record(how, (none, jolted), 1)), dict(record(how, (none, jolted), 2))
+    fault, same_fault, drive_alone, same_drive = (
+        found[errand] for errand in (none, jolted) for found in (alone, shared)
+    )
+    assert isinstance(fault, BadInput)
+    assert isinstance(same_fault, BadInput)
+    assert fault.line == same_fault.line
+    assert isinstance(drive_alone, Recording)
+    assert isinstance(same_drive, Recording)
+    assert same(drive_alone, same_drive)
+    assert drive_alone[:4] == (jolted.room, "expert", 3, Outcome.LATE)
+    off = (drive_alone.asked != drive_alone.taught).any(axis=1)
+    assert 0 < off.mean() < 0.8
+    assert (np.abs(drive_alone.taught) <= [Expert().fastest, 0.0, Expert().turning + 1e-9]).all()
 
 
-def test_a_room_that_there_is_not_does_not_end_a_run() -> None:
+def test_who_asks_to_stop_gets_what_is_under_way() -> None:
     how = How(Recipe(expert), "expert", eyes=EyeOptions("cast"), rules=RoomRules(seconds=0.2))
-    wanted = [Errand(RoomKey("straight", "train", "unseen", 0), 0), Errand(RoomKey("straight", "train", "seen", 0), 0)]
-    (_, first), (_, second) = record(how, wanted, 1)
-    assert isinstance(first, Exception)
-    assert not isinstance(second, Exception)
+    done: list[Errand] = []
+    for errand, _ in record(how, errands(("straight",), "train", "seen", 4), 1, lambda: len(done) == 2):
+        done.append(errand)
+    assert [errand.room.number for errand in done] == [0, 1]
 
 
 def test_the_expert_drives_and_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = (*RECORD, "--scenario", "straight", "--eyes", "cast", "--jobs", "1", "--out", str(tmp_path / "d"))
+    words = (
+        *RECORD,
+        "--scenario",
+        "straight",
+        "--first",
+        "16",
+        "--eyes",
+        "cast",
+        "--jobs",
+        "1",
+        "--out",
+        str(tmp_path / "d"),
+    )
     assert main([*words, "--episodes", "1", "--json"]) == 0
     figures = json.loads(capsys.readouterr().out)
     assert (figures["episodes"], figures["recorded"], figures["wins"]) == (1, 1, 1)
@@ -133,6 +151,8 @@ WRONG = {
     "--driver policy": "--driver policy and --policy belong together",
     "--copy a --show b": "--show and --copy exclude each other",
     "--copy a --out a": "it is the dataset itself",
+    "--driver policy --policy nothing --out new": "nothing/policy.json: there is no",
+    "--robot nobody --out new": "no humanoid named 'nobody'",
     "--episode 3": "--episode: an episode is shown by its number",
     "--out there": "there: it holds letter.txt, and no dataset",
     "--show kept --episode 4": "kept: there is no episode 4; it has 4, from 0",
@@ -150,6 +170,7 @@ def test_a_wrong_call_is_one_line(
         _ = kept(tmp_path / "kept")
     assert main([*RECORD, *words.split()]) == 2
     assert WRONG[words] in capsys.readouterr().err
+    assert not (tmp_path / "new").exists()
 
 
 CALL = (
@@ -163,9 +184,10 @@ def test_a_person_drives_at_a_terminal(tmp_path: Path) -> None:
     master, slave = pty.openpty()
     fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 100, 0, 0))
     before = termios.tcgetattr(slave)
-    words = (*RECORD, "--driver", "person", "--scenario", "straight", "--eyes", "cast", "--out", str(tmp_path / "d"))
+    words = (*RECORD, "--driver", "person", "--scenario", "straight", "--first", "16", "--eyes", "cast")
     child = subprocess.Popen(
-        [sys.executable, "-c", CALL, *words, "--episodes", "2"], stdin=slave, stdout=slave, stderr=slave,
+        [sys.executable, "-c", CALL, *words, "--episodes", "2", "--out", str(tmp_path / "d")],
+        stdin=slave, stdout=slave, stderr=slave,
         start_new_session=True, env={**os.environ, "TERM": "xterm-256color", "COLUMNS": "100"},
     )  # fmt: skip
     seen = b""

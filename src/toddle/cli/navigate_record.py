@@ -134,7 +134,7 @@ def _record(asked: Record) -> int:
 
 
 def _how(asked: Record) -> How:
-    """Who drives, and how.
+    """Who drives, and how; made once here, so that what can't be made is refused before anything is written.
 
     Raises:
         BadInput: the robot or the policy can't be used.
@@ -142,12 +142,14 @@ def _how(asked: Record) -> How:
     from toddle.outside.dataset.drives import How, expert
     from toddle.outside.navigation.physics_batch import Recipe
     from toddle.outside.navigation.room_eyes import EyeOptions
+    from toddle.robots.humanoids import load_humanoid
 
     recipe = Recipe(expert, (), asked.robot, asked.config)
     if asked.policy is not None:
         from toddle.outside.navigation.cloned import cloned
 
         recipe = Recipe(cloned, (asked.policy,), asked.robot, asked.config)
+    _ = recipe.make(load_humanoid(recipe.robot, recipe.config), *recipe.given)
     taught = asked.driver == "policy" or asked.noise > 0
     return How(recipe, asked.driver, taught, asked.noise, asked.anywhere, EyeOptions(asked.eyes))
 
