@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from toddle.outside.navigation.course import Course, Finish
     from toddle.outside.navigation.named_tasks import TaskSource
     from toddle.outside.navigation.physics_batch import Recipe
+    from toddle.outside.simulation.disturbances import WorldOptions
 
 _PROG = "toddle navigate evaluate"
 _TOLD_ELSEWHERE = ("env", "stopped")
@@ -31,14 +32,20 @@ class Evaluate:
 
     A policy that walks is judged in physics, whatever it was trained on; --pattern judges it on the walking pattern
     alone, in no time. A policy of the point gets the document's test, one of a Gymnasium environment its episodes.
-    The exit code is 0 whatever comes out.
+    A policy that learned by watching, or the expert, drives through rooms, where it has only its eyes; with --rooms
+    anybody does. The exit code is 0 whatever comes out.
 
     Attributes:
-        policy: the folder that toddle navigate ppo left.
+        policy: the folder that toddle navigate ppo or clone left.
         driver: who steers: the policy; a baseline that turns to the goal and walks there; the guide that plans the
-            shortest way around obstacles; a script (--script).
+            shortest way around obstacles; a script (--script); the expert, who knows what shows in a room.
         script: velocities from a file of lines "t vx vy omega", for --driver script.
-        episodes: how many goals.
+        episodes: how many goals; how many rooms of each scenario.
+        rooms: drive through rooms.
+        scenario: which kinds of rooms; all six unless given.
+        style: of their surfaces and light: as in training, or such as nobody trained on.
+        split: of the rooms: test, or validation for choosing something by.
+        eyes: how the robot sees there: a stereo pair, or small pictures by rays.
         pattern: judge on the walking pattern alone.
         robot: another robot than the policy was trained on: a name or a description's path.
         config: a TOML file that says what a humanoid's description leaves out.
@@ -52,9 +59,14 @@ class Evaluate:
     """
 
     policy: Path | None = None
-    driver: Literal["policy", "baseline", "guide", "script"] = "policy"
+    driver: Literal["policy", "baseline", "guide", "script", "expert"] = "policy"
     script: Path | None = None
     episodes: int = 100
+    rooms: bool = False
+    scenario: tuple[Literal["straight", "curve", "obstacle", "search", "person", "decoys"], ...] | None = None
+    style: Literal["seen", "unseen"] = "seen"
+    split: Literal["test", "validation"] = "test"
+    eyes: Literal["stereo", "cast"] = "stereo"
     pattern: bool = False
     robot: str | None = None
     config: Path | None = None
@@ -71,6 +83,10 @@ def main(argv: Sequence[str]) -> int:
     """Judge, and return the exit code."""
     asked = parse(Evaluate, argv, prog=_PROG)
     _check(asked)
+    if _in_rooms(asked):
+        from toddle.cli.navigate_rooms import judge_in_rooms
+
+        return judge_in_rooms(asked)
     if asked.driver == "policy":
         assert asked.policy is not None
         from toddle.outside.navigation.policy_files import load_policy
@@ -92,6 +108,7 @@ def _check(asked: Evaluate) -> None:
         raise BadInput(f"{flag} is of a policy, and {asked.driver} steers", where=_PROG, remedy="leave one out")
     if (asked.driver == "script") != (asked.script is not None):
         raise BadInput("--driver script and --script belong together", where=_PROG, remedy="give both")
+    _check_rooms(asked)
     for name, most in _MOST.items():
         value = getattr(asked, name)
         least = 0 if name in ("circles", "people") else 1
@@ -104,6 +121,30 @@ def _check(asked: Evaluate) -> None:
     refuse_used(asked.out)
 
 
+def _in_rooms(asked: Evaluate) -> bool:
+    """Whether somebody drives through rooms."""
+    from toddle.outside.navigation.room_policies import is_cloned
+
+    return asked.rooms or asked.driver == "expert" or (asked.policy is not None and is_cloned(asked.policy))
+
+
+def _check_rooms(asked: Evaluate) -> None:
+    """Refuse what rooms have not, and what only rooms have."""
+    if _in_rooms(asked):
+        for flag, given in (("pattern", asked.pattern), ("circles", asked.circles), ("people", asked.people)):
+            if given not in (None, False):
+                raise BadInput(f"--{flag} is of no meaning in rooms", where=_PROG, remedy="leave it out")
+        if asked.style == "unseen" and asked.split != "test":
+            raise BadInput("the unseen style is kept for tests", where="--style", remedy="leave --split out")
+        if asked.scenario is not None and len(set(asked.scenario)) < len(asked.scenario):
+            raise BadInput("one is named twice", where="--scenario", remedy="name each once")
+        return
+    usual = Evaluate()
+    for flag in ("scenario", "style", "split", "eyes"):
+        if getattr(asked, flag) != getattr(usual, flag):
+            raise BadInput(f"--{flag} is of rooms", where=_PROG, remedy="add --rooms")
+
+
 def _judge_in_physics(asked: Evaluate) -> int:
     from toddle.outside.navigation.course import Rules, summary
     from toddle.outside.navigation.physics_batch import run_courses
@@ -111,7 +152,7 @@ def _judge_in_physics(asked: Evaluate) -> int:
     from toddle.outside.terminal import Reporter, stoppable
 
     policy = None if asked.policy is None else load_policy(asked.policy)
-    source, recipe = _made(asked, policy)
+    source, recipe = made(asked, policy)
     courses = draw_courses(asked.seed, asked.episodes, source.circles, source.people, Rules().seconds)
     with (
         left_folder(asked.out, "evaluate") as folder,
@@ -126,7 +167,7 @@ def _judge_in_physics(asked: Evaluate) -> int:
             reporter.tell(len(done), f"{won} of {len(done)} reached")
 
         finishes = run_courses(
-            recipe, courses, Rules(told=source.told), world=_world(asked), seed=asked.seed, processes=asked.jobs,
+            recipe, courses, Rules(told=source.told), world=world_of(asked), seed=asked.seed, processes=asked.jobs,
             progress=told, stopped=lambda: stop.asked,
         )  # fmt: skip
         pairs = [(course, finish) for course, finish in zip(courses, finishes, strict=True) if finish is not None]
@@ -143,7 +184,7 @@ def _judge_in_physics(asked: Evaluate) -> int:
     return 130 if stop.asked else 0
 
 
-def _made(asked: Evaluate, policy: Policy | None) -> tuple[TaskSource, Recipe]:
+def made(asked: Evaluate, policy: Policy | None) -> tuple[TaskSource, Recipe]:
     """The task, and who steers whom; made once here, so that what can't be made is refused before anything begins.
 
     Raises:
@@ -191,6 +232,7 @@ def learned_figures(figures: Any) -> dict[str, Any]:
 
 
 def _recipe(asked: Evaluate, robot: str, config: Path | None) -> Recipe:
+    from toddle.navigate.cloning.expert import Expert
     from toddle.outside.navigation.guided import Guided
     from toddle.outside.navigation.physics_batch import Recipe, baseline, same
     from toddle.outside.navigation.steered import learned, scripted
@@ -204,9 +246,12 @@ def _recipe(asked: Evaluate, robot: str, config: Path | None) -> Recipe:
             return Recipe(same, (Guided(),), robot, config)
         case "script":
             return Recipe(scripted, (asked.script,), robot, config)
+        case "expert":
+            return Recipe(same, (Expert(),), robot, config)
 
 
-def _world(asked: Evaluate) -> Any:
+def world_of(asked: Evaluate) -> WorldOptions | None:
+    """The world of what is asked; None: the usual one."""
     from dataclasses import asdict
 
     from toddle.outside.simulation.disturbances import Noise, WorldOptions

@@ -14,7 +14,7 @@ from toddle.failures import BadInput
 RUN = "checkpoint.json"
 FILES = (
     RUN, "policy.json", "policy.safetensors", "checkpoints", "config.json", "figures.json", "learning.png",
-    "tensorboard", "courses.json", "paths.png", "cases.png",
+    "tensorboard", "courses.json", "drives.json", "paths.png", "cases.png",
 )  # fmt: skip
 
 

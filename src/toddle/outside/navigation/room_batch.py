@@ -10,7 +10,7 @@ import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from multiprocessing import get_context
 from typing import NamedTuple
 
@@ -44,7 +44,7 @@ class Judged:
 
     recipe: Recipe
     eyes: EyeOptions | None = None
-    rules: RoomRules = RoomRules()
+    rules: RoomRules = field(default_factory=RoomRules)
     world: WorldOptions | None = None
     seed: int = 0
     kept: int = 0

@@ -186,6 +186,8 @@ class _Row(NamedTuple):
     """A look, and what was said about it."""
 
     situation: Situation
+    sight: Sight
+    showing: Showing
     asked: Velocity
     taught: Velocity
 
@@ -196,24 +198,23 @@ class _Notes:
     def __init__(self, teacher: Driver | None) -> None:
         self._teacher = teacher
         self._memory = None if teacher is None else teacher.start()
-        self.rows: list[_Row] = []
-
-    @property
-    def asked(self) -> list[Velocity]:
-        return [row.asked for row in self.rows]
+        self.asked: list[Velocity] = []
+        self._rows: list[_Row] = []
 
     def write(self, situation: Situation, asked: Velocity) -> None:
         taught: Velocity | None = asked
         if self._teacher is not None:
             taught, self._memory = self._teacher.decide(self._memory, situation)
-        self.rows.append(_Row(situation, asked, STILL if taught is None else taught))
+        self.asked.append(asked)
+        if situation.sight is not None and situation.showing is not None:
+            said = asked, STILL if taught is None else taught
+            self._rows.append(_Row(situation, situation.sight, situation.showing, *said))
 
     def recording(self, key: RoomKey, called: str, seed: int, outcome: Outcome, start: Start) -> Recording:
         """All looks, in the frame that the room was drawn in."""
-        sights = [row.situation.sight for row in self.rows]
-        shown = [row.situation.showing for row in self.rows]
-        places = np.array([showing.place for showing in shown])
-        circles = np.array([showing.circles for showing in shown])
+        rows = self._rows
+        places = np.array([row.showing.place for row in rows])
+        circles = np.array([row.showing.circles for row in rows])
         places[:, :2], circles[..., :2] = (
             drawn_places(places[:, :2], start),
             drawn_places(circles[..., :2], start),
@@ -224,15 +225,15 @@ class _Notes:
             called,
             seed,
             outcome,
-            np.array([row.situation.t for row in self.rows]),
-            np.array([sight.picture for sight in sights]),
-            np.array([sight.depth for sight in sights]),
-            np.array([tuple(row.situation.velocity) for row in self.rows]),
-            np.array([tuple(row.asked) for row in self.rows]),
-            np.array([tuple(row.taught) for row in self.rows]),
+            np.array([row.situation.t for row in rows]),
+            np.array([row.sight.picture for row in rows]),
+            np.array([row.sight.depth for row in rows]),
+            np.array([tuple(row.situation.velocity) for row in rows]),
+            np.array([tuple(row.asked) for row in rows]),
+            np.array([tuple(row.taught) for row in rows]),
             places,
             circles,
-            np.array([showing.pixels for showing in shown]),
+            np.array([row.showing.pixels for row in rows]),
         )
 
 
