@@ -18,6 +18,7 @@ _RING = np.arange(10) * math.pi / 5  # where nodes stand around a circle [rad]
 _CHORD = 1.0 / math.cos(math.pi / 10)  # so that the way between two neighbours stays clear of it
 _SPARE = 0.03  # beyond the disc [m]
 _SLACK = 0.06  # of a disc that stands at a circle, or it would see no way along it [m]
+_PASSED = 0.2  # a corner so near is not gone to [m]
 _HOPS = 8  # corners of a way, at most
 _STEP = 0.1  # between places along a heading that are compared with walls [m]
 
@@ -106,7 +107,9 @@ def first_corner(
     cost = np.hypot(*towards.T) + left + right * np.maximum(-aside, 0.0)
     if math.isfinite(heading):
         cost += change * np.abs(_wrapped(bearing - heading))
-    cost = np.where(_clear(place[None], nodes, small, body)[0], cost, np.inf)
+    passed = np.hypot(*towards.T) < _PASSED
+    passed[0] = False
+    cost = np.where(_clear(place[None], nodes, small, body)[0] & ~passed, cost, np.inf)
     best = int(np.argmin(cost))
     return nodes[best] if math.isfinite(cost[best]) else goal
 

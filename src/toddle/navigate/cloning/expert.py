@@ -83,7 +83,7 @@ class Expert:
     berth: float = 0.42
     body: float = 0.31
     stop: float = 0.5
-    memory: float = 15.0
+    memory: float = 25.0
     patience: float = 15.0
     period: float = PERIOD
 
@@ -176,7 +176,7 @@ class Expert:
     ) -> Float[np.ndarray, "3"] | None:
         """Where somebody is who stands, or will come, between here and the goal; None: nobody is."""
         place = showing.place[:2]
-        fresh = known.walks & (t - known.seen <= self.memory / 3)
+        fresh = known.walks & (t - known.seen <= self.memory / 5)
         fresh[0] = False
         way = math.atan2(goal[1] - place[1], goal[0] - place[0])
         far = min(float(np.hypot(*(goal - place))), 1.5)
@@ -197,7 +197,7 @@ class Expert:
 
     def _around(self, known: Known, t: float) -> Float[np.ndarray, "known 3"]:
         """What is remembered, the target left out; of who walks also where that will be in a second."""
-        fresh = t - known.seen <= np.where(known.walks, self.memory / 3, self.memory)
+        fresh = t - known.seen <= np.where(known.walks, self.memory / 5, self.memory)
         fresh[0] = False
         soon = known.circles[fresh & known.walks].copy()
         soon[:, :2] += known.speed[fresh & known.walks]
