@@ -39,7 +39,7 @@ def test_lerobot_sees_what_was_written(tmp_path: Path) -> None:
     assert np.array_equal(pictures, np.concatenate([one.picture for one in kept]))
     assert np.array_equal(seen[layout.DEPTH][:, 0], np.concatenate([millimetres(one.depth) for one in kept]))
     assert np.array_equal(seen[layout.ACTION], np.concatenate([one.asked for one in kept]).astype(np.float32))
-    circles = np.concatenate([one.circles for one in kept[:1]]).astype(np.float32)
-    assert np.array_equal(seen[layout.CIRCLES][:3, :4], circles)
-    assert (seen[layout.CIRCLES][:3, 4:, 2] == -1).all()
+    circles = seen[layout.CIRCLES].reshape(12, -1, 3)
+    assert np.array_equal(circles[:3, :4], kept[0].circles.astype(np.float32))
+    assert (circles[:3, 4:, 2] == -1).all()
     assert seen["episode_index"].tolist() == [0] * 3 + [1] * 4 + [2] * 5

@@ -52,9 +52,10 @@ def _column(dtype: str, shape: Sequence[int], names: Any = None, **more: Any) ->
 def features() -> dict[str, dict[str, Any]]:
     """The columns, as ``meta/info.json`` tells them."""
     frame = ["height", "width", "channels"]
+    # without video.pix_fmt: LeRobot's tools copy these files whole, but refuse to hear of gbrp
     video = {
-        "video.height": ROWS, "video.width": COLUMNS, "video.codec": "h264", "video.pix_fmt": "gbrp",
-        "video.fps": FPS, "video.channels": 3, "is_depth_map": False, "has_audio": False,
+        "video.height": ROWS, "video.width": COLUMNS, "video.codec": "h264", "video.fps": FPS, "video.channels": 3,
+        "is_depth_map": False, "has_audio": False,
     }  # fmt: skip
     deep = {"is_depth_map": True, "depth_unit": "mm"}
     return {
@@ -65,7 +66,7 @@ def features() -> dict[str, dict[str, Any]]:
         TAUGHT: _column("float64", (3,), _VELOCITY),
         TIME: _column("float64", (1,)),
         PLACE: _column("float64", (3,), ["x", "y", "yaw"]),
-        CIRCLES: _column("float64", (MOST_THINGS, 3)),
+        CIRCLES: _column("float64", (3 * MOST_THINGS,)),
         PIXELS: _column("int64", (MOST_THINGS,)),
         "timestamp": _column("float32", (1,)),
         **{name: _column("int64", (1,)) for name in ("frame_index", "episode_index", "index", "task_index")},

@@ -120,7 +120,7 @@ def _table(recording: Recording, depth: UInt16[np.ndarray, "looks rows columns"]
         layout.DEPTH: pa.array(files, pa.struct({"bytes": pa.binary(), "path": pa.string()})),
         **{column: _vectors(np.asarray(getattr(recording, name), float)) for column, name in _VECTORS.items()},
         layout.TIME: pa.array(np.asarray(recording.t, float)),
-        layout.CIRCLES: pa.array(circles.tolist(), pa.list_(pa.list_(pa.float64()))),
+        layout.CIRCLES: _vectors(circles.reshape(looks, -1)),
         layout.PIXELS: _vectors(pixels),
         "timestamp": pa.array((frame / layout.FPS).astype(np.float32)),
         "frame_index": pa.array(frame),
@@ -201,8 +201,7 @@ def _recording(table: pa.Table, facts: Facts) -> tuple[Recording, UInt16[np.ndar
     looks, things = facts.looks, facts.things
     files = [pictures.from_png(one["bytes"]) for one in table[layout.DEPTH].to_pylist()]
     depth = np.array(files, np.uint16).reshape(looks, ROWS, COLUMNS)
-    flat = table[layout.CIRCLES].combine_chunks().flatten().flatten().to_numpy(zero_copy_only=False)
-    circles = flat.reshape(looks, layout.MOST_THINGS, 3)[:, :things]
+    circles = _numbers(table, layout.CIRCLES, looks, 3 * layout.MOST_THINGS).reshape(looks, -1, 3)[:, :things]
     pixels = _numbers(table, layout.PIXELS, looks, layout.MOST_THINGS)[:, :things].astype(np.int64)
     vectors = {name: _numbers(table, column, looks, 3) for column, name in _VECTORS.items()}
     recording = Recording(
@@ -215,6 +214,7 @@ def _recording(table: pa.Table, facts: Facts) -> tuple[Recording, UInt16[np.ndar
 
 def _numbers(table: pa.Table, column: str, looks: int, width: int) -> Shaped[np.ndarray, "looks width"]:
     """A column as an array of its own, which may be written to."""
-    found = table[column].combine_chunks()
-    flat = found.flatten() if width > 1 else found
+    flat = table[column].combine_chunks()
+    while pa.types.is_list(flat.type) or pa.types.is_fixed_size_list(flat.type):
+        flat = flat.flatten()
     return flat.to_numpy(zero_copy_only=False).reshape(looks, width).copy()
