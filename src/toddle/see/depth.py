@@ -1,7 +1,8 @@
 """From two rectified pictures to depth: match, smooth, divide (Huber 2019, section 2.2.4 and figure 2.24).
 
-A `Setting` says how. `DOCUMENT` is the document's own; `LIVE` works on pictures of half the size and is quick enough
-for a robot that walks; `BEST` takes its time. `SETTINGS` names them all.
+A `Setting` says how. `LIVE` works on pictures of half the size and is quick enough for a robot that walks; `BEST` takes
+its time; both match semi-globally, which trusts walls with little texture that blocks leave open. `DOCUMENT` is the
+document's own. `SETTINGS` names them all.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from toddle.failures import BadInput
 from toddle.geometry.camera import RectifiedCameras
 from toddle.see.filters import Guided, LeastSquares, Smoother
 from toddle.see.matchers import BlockMatching, DocumentMatching, Found, Grey, Matcher, SemiGlobal
+from toddle.see.trouble import statistics, told
 from toddle.signals import DepthImage
 
 _BLACK, _SATURATED = 3, 252  # grey values that tell nothing
@@ -32,6 +34,8 @@ class Setting:
         match_at: a picture's share of its width at which it is matched: 1 or 2 (half).
         smooth_at: likewise for smoothing.
         sufficient: confidence from which on a pixel counts as valid.
+        edge: disparities that differ by more within three by three pixels belong to two things: neither is trusted,
+            as smoothing leaves something between them [pixels at which it is smoothed].
     """
 
     matcher: Matcher
@@ -39,17 +43,20 @@ class Setting:
     match_at: int = 1
     smooth_at: int = 1
     sufficient: float = 0.5
+    edge: float = float("inf")
 
 
-LIVE = Setting(BlockMatching(5, 16, texture=20), Guided(4, 12, 30.0), match_at=2, smooth_at=2)
+LIVE = Setting(SemiGlobal(3, 16, uniqueness=15), Guided(4, 12, 30.0), match_at=2, smooth_at=2, edge=0.4)
 """Half the size throughout."""
-BEST = Setting(BlockMatching(7, 32, contrast=8.0), LeastSquares(3e3, 1.0), smooth_at=2)
+BEST = Setting(SemiGlobal(5, 32, uniqueness=15), LeastSquares(300.0, 2.0), smooth_at=2, edge=0.3)
 """Matched at full size, smoothed at half."""
+BLOCKS = Setting(BlockMatching(7, 32, contrast=8.0), LeastSquares(300.0, 2.0), smooth_at=2)
+"""The same with block matching."""
+QUICK = Setting(BlockMatching(5, 16), Guided(4, 12, 30.0), match_at=2, smooth_at=2)
+"""Half the size throughout, with block matching."""
 DOCUMENT = Setting(DocumentMatching(13, 32), LeastSquares(1e4, 1.0))
 """The document's: N = 13, D = 32, lambda = 1e4, sigma = 1."""
-SEMI_GLOBAL = Setting(SemiGlobal(5, 32), LeastSquares(1e3, 1.0), smooth_at=2)
-"""Semi-global matching."""
-SETTINGS = {"live": LIVE, "best": BEST, "document": DOCUMENT, "semi-global": SEMI_GLOBAL}
+SETTINGS = {"live": LIVE, "best": BEST, "blocks": BLOCKS, "quick": QUICK, "document": DOCUMENT}
 """By name."""
 
 
@@ -104,9 +111,10 @@ def stages_of(
         raise BadInput(what, where="pictures", remedy=f"give {least} or more each way")
     small = tuple(_smaller(one, settings.match_at) for one in (ours, theirs))
     found = settings.matcher.find(*small)
+    found = Found(found.disparity, np.where(_lit(small[0]), found.confidence, np.float32(0)))
     guide = small[0] if settings.smooth_at == settings.match_at else _smaller(ours, settings.smooth_at)
     smoothed = settings.smoother.smooth(_as_large(found, guide), guide)
-    return Stages(ours, theirs, found, _as_large(smoothed, ours))
+    return Stages(ours, theirs, found, _as_large(_without_edges(smoothed, settings.edge), ours))
 
 
 def image_of(
@@ -114,15 +122,27 @@ def image_of(
 ) -> DepthImage:
     """The depth that follows; as `depth_of`."""
     disparity, confidence = stages.smoothed
-    known = disparity > 0
-    lit = cv2.inRange(stages.left, np.array(_BLACK), np.array(_SATURATED)) > 0
-    valid = known & lit & (confidence > np.float32(settings.sufficient))
+    known = disparity > 0 if seen is None else (disparity > 0) & seen
+    valid = known & _lit(stages.left) & (confidence > np.float32(settings.sufficient))
     valid &= disparity <= np.arange(disparity.shape[1], dtype=np.float32)
-    if seen is not None:
-        valid &= seen
     there = np.where(known, disparity, np.float32(np.nan))
     depth = np.float32(cameras.camera.fx * cameras.baseline) / there
-    return DepthImage(there, depth, confidence, valid)
+    trusted = cv2.countNonZero(valid.view(np.uint8)) / valid.size
+    trouble = told(statistics(stages.left, stages.right, stages.found.confidence, trusted))
+    return DepthImage(there, depth, confidence, valid, trouble)
+
+
+def _lit(picture: Grey) -> Bool[np.ndarray, "rows columns"]:
+    """Neither black nor saturated, where nothing can be told apart."""
+    return cv2.inRange(picture, np.array(_BLACK + 1), np.array(_SATURATED - 1)) > 0
+
+
+def _without_edges(found: Found, edge: float) -> Found:
+    """No trust in what lies between two things."""
+    if np.isinf(edge):
+        return found
+    apart = cv2.morphologyEx(found.disparity, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8))
+    return Found(found.disparity, np.where(apart > np.float32(edge), np.float32(0), found.confidence))
 
 
 def _smaller(picture: Grey, share: int) -> Grey:

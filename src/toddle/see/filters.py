@@ -16,7 +16,7 @@ from jaxtyping import Float32
 
 from toddle.see.matchers import Found, Grey
 
-_NOTHING = 1e-4  # smoothed confidence that tells nothing
+_NOTHING = 1e-7  # smoothed confidence that tells nothing
 
 
 @runtime_checkable
