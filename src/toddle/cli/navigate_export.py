@@ -18,7 +18,7 @@ class Export:
 
     Attributes:
         file: where to; its ending says what it becomes: .onnx, or .jax for jax.export.
-        policy: the folder that toddle navigate ppo left.
+        policy: the folder that toddle navigate ppo or toddle navigate clone left.
     """
 
     file: Annotated[Path, POSITIONAL]
@@ -28,9 +28,14 @@ class Export:
 def main(argv: Sequence[str]) -> int:
     """Write the file; returns the exit code."""
     asked = parse(Export, argv, prog="toddle navigate export")
+    from toddle.outside.navigation.cloning_files import is_cloned, load_cloned
+    from toddle.outside.navigation.export_cloned import export_cloned
     from toddle.outside.navigation.export_policy import export_policy
     from toddle.outside.navigation.policy_files import load_policy
 
-    export_policy(load_policy(asked.policy), asked.file)
+    if is_cloned(asked.policy):
+        export_cloned(load_cloned(asked.policy), asked.file)
+    else:
+        export_policy(load_policy(asked.policy), asked.file)
     print(f"the policy, to be used without toddle: {asked.file}", file=sys.stderr)
     return 0

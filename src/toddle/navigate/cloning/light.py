@@ -14,7 +14,8 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from toddle.navigate.sight import COLUMNS, ROWS
 
-_SQUARE = 4
+SQUARE = 4
+"""Side of the first convolution's squares [pixels]."""
 
 
 class LightEyes(eqx.Module):
@@ -35,8 +36,8 @@ class LightEyes(eqx.Module):
     def __call__(self, frames: Float[Array, "looks 60 80 parts"]) -> Float[Array, "looks features"]:
         """Features of each look."""
         looks, rows, columns, parts = frames.shape
-        down, across = rows // _SQUARE, columns // _SQUARE
-        squares = frames.reshape(looks, down, _SQUARE, across, _SQUARE * parts).swapaxes(2, 3)
+        down, across = rows // SQUARE, columns // SQUARE
+        squares = frames.reshape(looks, down, SQUARE, across, SQUARE * parts).swapaxes(2, 3)
         x = squares.reshape(looks * down * across, -1) @ self.first + self.biases[0][None]
         x = jax.nn.relu(x).reshape(looks, down, across, -1)
         for kernel, bias in zip(self.kernels, self.biases[1:-1], strict=True):
@@ -55,12 +56,12 @@ def light_eyes(parts: int, channels: tuple[int, ...], features: int, key: PRNGKe
     """
     keys = jax.random.split(key, len(channels) + 1)
     he = jax.nn.initializers.he_normal()
-    rows, columns = ROWS // _SQUARE, COLUMNS // _SQUARE
+    rows, columns = ROWS // SQUARE, COLUMNS // SQUARE
     kernels = []
     for one, before, after in zip(keys[1:-1], channels[:-1], channels[1:], strict=True):
         kernels.append(he(one, (3, 3, before, after), jnp.float32))
         rows, columns = -(-rows // 2), -(-columns // 2)
-    first = he(keys[0], (_SQUARE * _SQUARE * parts, channels[0]), jnp.float32)
+    first = he(keys[0], (SQUARE * SQUARE * parts, channels[0]), jnp.float32)
     last = he(keys[-1], (rows * columns * channels[-1], features), jnp.float32)
     return LightEyes(first, tuple(kernels), last, tuple(jnp.zeros(n, jnp.float32) for n in (*channels, features)))
 

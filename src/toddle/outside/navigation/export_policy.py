@@ -143,13 +143,13 @@ def _layers(graph: Graph, layers: Layers, x: Value) -> tuple[Value, Mapping[str,
     if layers.cell is not None:
         memory = Value(graph, "memory")
         before, inside = (graph.node("Gather", memory, graph.kept(np.array(part)), axis=1) for part in (0, 1))
-        x, inside = _remembered(graph, layers.cell, x, before, inside)
+        x, inside = lstm(graph, layers.cell, x, before, inside)
         both = [graph.node("Unsqueeze", part, graph.whole(1)) for part in (x, inside)]
         outputs["next_memory"] = graph.node("Concat", *both, axis=1)
     return _linear(graph, x, layers.weights[-1], layers.biases[-1]), outputs
 
 
-def _remembered(graph: Graph, cell: Any, x: Value, before: Value, inside: Value) -> tuple[Value, Value]:
+def lstm(graph: Graph, cell: Any, x: Value, before: Value, inside: Value) -> tuple[Value, Value]:
     """Output and cell of an LSTM (Hochreiter and Schmidhuber 1997), its gates as Equinox has them."""
     gates = graph.node("MatMul", x, np.asarray(cell.weight_ih).T) + _linear(
         graph, before, np.asarray(cell.weight_hh).T, cell.bias
