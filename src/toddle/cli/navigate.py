@@ -22,7 +22,8 @@ _EXAMPLES = """\
   toddle navigate ppo point                        the document's benchmark, in seconds
   toddle navigate ppo --env Pendulum-v1            any Gymnasium environment
   toddle navigate evaluate --policy runs/goal      judge what was learned, in physics
-  toddle walk --policy runs/goal --goal -1 2       watch it walk there"""
+  toddle walk --policy runs/goal --goal -1 2       watch it walk there
+  toddle navigate record --driver person           drive it yourself, and see what it sees"""
 
 
 def main(argv: Sequence[str]) -> int:
