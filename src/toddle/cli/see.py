@@ -1,4 +1,4 @@
-"""``toddle see``: two cameras, calibrated and rectified. Each kind of work has a module of its own."""
+"""``toddle see``: two cameras, calibrated and rectified, and their depth. Each kind of work has a module of its own."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ from toddle.failures import BadInput, unknown_name
 WORK = {
     "calibrate": "two cameras, from pictures of a chessboard",
     "rectify": "a pair of pictures: the same thing in the same row of both",
+    "depth": "how far everything is, from a pair of pictures or two folders",
 }
 
 _PROG = "toddle see"
 _EXAMPLES = """\
   toddle see calibrate left/ right/                cameras from two folders of chessboard pictures
-  toddle see rectify l.png r.png --cameras left.yaml"""
+  toddle see rectify l.png r.png --cameras left.yaml
+  toddle see depth l.png r.png --cameras left.yaml --stages"""
 
 
 def main(argv: Sequence[str]) -> int:
@@ -33,6 +35,6 @@ def main(argv: Sequence[str]) -> int:
 def _help() -> str:
     works = "\n".join(f"  {name:<12}{what}" for name, what in WORK.items())
     return (
-        "See: two cameras, calibrated and rectified.\n\n"
+        "See: two cameras, calibrated and rectified, and the depth they tell.\n\n"
         f"usage: {_PROG} WORK ...       ({_PROG} WORK --help tells more)\n\n{works}\n\n{_EXAMPLES}"
     )
