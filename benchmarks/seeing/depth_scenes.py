@@ -86,7 +86,9 @@ class Stage:
     def take(self, painters: Painters, exposure: Exposure, rng: np.random.Generator) -> Taken:
         """Both pictures from where the robot stands."""
         seen = self._camera.see()
-        pair = [painter.paint(one, exposure, rng) for painter, one in zip(painters, (seen.left, seen.right), strict=True)]
+        pair = [
+            painter.paint(one, exposure, rng) for painter, one in zip(painters, (seen.left, seen.right), strict=True)
+        ]
         return Taken(pair[0], pair[1], seen)
 
     def close(self) -> None:
@@ -98,7 +100,7 @@ def stand(simulation: HumanoidSimulation, room: Room, rng: np.random.Generator) 
     """Put the robot somewhere free, one of the room's things before it, swaying a little."""
     circles, (a, b) = room.circles, room.hall.half
     cos, sin = math.cos(room.hall.yaw), math.sin(room.hall.yaw)
-    for _ in range(1000):
+    while True:
         own = rng.uniform(-1, 1, 2) * (a - 0.6, b - 0.6)
         x, y = room.hall.x + cos * own[0] - sin * own[1], room.hall.y + sin * own[0] + cos * own[1]
         if np.all(np.hypot(circles[:, 0] - x, circles[:, 1] - y) > circles[:, 2] + 0.6):
@@ -152,9 +154,7 @@ def painters(cameras: StereoCameras) -> Painters:
     return Painter(cameras.left, left), Painter(cameras.right, left @ cameras.rotation.T)
 
 
-def true_depth(
-    seen: StereoPicture, cameras: StereoCameras, made: Rectification
-) -> Float32[np.ndarray, "rows columns"]:
+def true_depth(seen: StereoPicture, cameras: StereoCameras, made: Rectification) -> Float32[np.ndarray, "rows columns"]:
     """How far what each rectified pixel shows is along the rectified left camera's axis [m]; NaN: it shows nothing.
 
     Args:
