@@ -18,6 +18,7 @@ _RING = np.arange(10) * math.pi / 5  # where nodes stand around a circle [rad]
 _CHORD = 1.0 / math.cos(math.pi / 10)  # so that the way between two neighbours stays clear of it
 _SPARE = 0.03  # beyond the disc [m]
 _SLACK = 0.06  # of a disc that stands at a circle, or it would see no way along it [m]
+_TOUCH = 0.001  # between a disc and what it overlapped [m]
 _PASSED = 0.2  # a corner so near is not gone to [m]
 _HOPS = 8  # corners of a way, at most
 _STEP = 0.1  # between places along a heading that are compared with walls [m]
@@ -26,10 +27,18 @@ Points = Float[np.ndarray, "points 2"]
 Circles = Float[np.ndarray, "circles 3"]
 
 
-def narrowed(circles: Circles, place: Float[np.ndarray, "2"], body: float, slack: float = 0.001) -> Circles:
-    """Circles that the disc overlaps already, made so small that it is clear of them by the slack: it may walk away."""
-    left = np.hypot(*(circles[:, :2] - place).T) - circles[:, 2] - body - slack
-    return np.column_stack([circles[:, :2], circles[:, 2] + np.minimum(left, 0.0)])
+def narrowed(circles: Circles, place: Float[np.ndarray, "2"], body: float, slack: float = _TOUCH) -> Circles:
+    """Circles that the disc is nearer to than the slack, made smaller by up to that, or so that it may walk away.
+
+    Args:
+        circles: x, y, radius [m].
+        place: of the disc [m].
+        body: radius of the disc [m].
+        slack: [m].
+    """
+    left = np.hypot(*(circles[:, :2] - place).T) - circles[:, 2] - body
+    less = np.minimum(slack - left, np.maximum(slack, _TOUCH - left))
+    return np.column_stack([circles[:, :2], circles[:, 2] - np.maximum(less, 0.0)])
 
 
 def free_lengths(
@@ -126,7 +135,9 @@ def _nodes(circles: Circles, hall: Hall | None, body: float) -> Points:
     return points[free]
 
 
-def _clear(starts: Points, ends: Points, circles: Circles, body: float) -> Bool[np.ndarray, "starts ends"]:
+def _clear(
+    starts: Float[np.ndarray, "starts 2"], ends: Float[np.ndarray, "ends 2"], circles: Circles, body: float
+) -> Bool[np.ndarray, "starts ends"]:
     """Whether a disc can go straight from each start to each end."""
     way = ends[None] - starts[:, None]
     square = np.maximum((way**2).sum(axis=2), 1e-12)
