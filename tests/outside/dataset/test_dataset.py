@@ -159,7 +159,7 @@ from toddle.outside.dataset.reader import episodes, read_episode
 from toddle.outside.dataset.writer import Writer
 folder, draw = Path({folder!r}), random.Random(7)
 whole = 0
-for attempt in range(12):
+for attempt in range(12):  # killed in its first, second or third episode, or a later one
     heard, said = os.pipe()
     child = os.fork()
     if not child:
@@ -169,10 +169,11 @@ for attempt in range(12):
                 writer.add(drive(number, 2))
                 os.write(said, b"x")
     os.close(said)
-    time.sleep(draw.uniform(0.02, 0.35))
+    told = sum(len(os.read(heard, 1)) for _ in range(attempt % 3))
+    time.sleep(draw.uniform(0.0, 0.15))
     os.kill(child, signal.SIGKILL)
     os.waitpid(child, 0)
-    told = len(os.read(heard, 65536))
+    told += len(os.read(heard, 65536))
     os.close(heard)
     there = len(episodes(folder)) if (folder / "meta").exists() else 0
     assert whole + told <= there <= whole + told + 1, (whole, told, there)
@@ -189,8 +190,7 @@ def test_killed_at_random_moments_it_loses_at_most_one_episode(tmp_path: Path) -
     script = textwrap.dedent(KILLED).format(tests=str(Path(__file__).parents[2]), folder=str(tmp_path / "d"))
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
-    assert int(done.stdout) >= 5
-    assert not list((tmp_path / "d").rglob("*.part"))
+    assert int(done.stdout) >= 12
 
 
 def _cut(path: Path) -> None:
