@@ -51,13 +51,17 @@ def test_drives_go_through_the_scenarios_in_turn_and_are_not_driven_twice(tmp_pa
     assert not set(wanted) & set(errands(("straight", "search"), "train", "seen", 5, first=7, seed=3))
     assert wanted == errands(("straight", "search"), "train", "seen", 9, first=7, seed=2)[:5]
     assert missing(tmp_path / "none", wanted, "expert") == wanted
-    with Writer(tmp_path) as writer:
+    (tmp_path / "killed/meta").mkdir(parents=True)  # before anything was in it
+    assert missing(tmp_path / "killed", wanted, "expert") == wanted
+    with Writer(tmp_path / "killed") as writer:
+        assert len(writer) == 0
+    with Writer(tmp_path / "d") as writer:
         for errand in (wanted[1], wanted[3]):
             writer.add(drive()._replace(room=errand.room, seed=errand.seed))
-    assert missing(tmp_path, wanted, "expert") == (wanted[0], wanted[2], wanted[4])
-    assert missing(tmp_path, wanted, "person") == wanted
-    layout.data_file(tmp_path, 0).unlink()
-    assert missing(tmp_path, wanted, "expert") == (*wanted[:3], wanted[4])
+    assert missing(tmp_path / "d", wanted, "expert") == (wanted[0], wanted[2], wanted[4])
+    assert missing(tmp_path / "d", wanted, "person") == wanted
+    layout.data_file(tmp_path / "d", 0).unlink()
+    assert missing(tmp_path / "d", wanted, "expert") == (*wanted[:3], wanted[4])
 
 
 def test_two_processes_drive_as_one_does_and_a_room_that_there_is_not_ends_neither() -> None:

@@ -155,7 +155,7 @@ import os, random, signal, sys, time
 sys.path.insert(0, {tests!r})
 from pathlib import Path
 from drives import drive, same
-from toddle.outside.dataset.reader import episodes, read_episode
+from toddle.outside.dataset.reader import begun, episodes, read_episode
 from toddle.outside.dataset.writer import Writer
 folder, draw = Path({folder!r}), random.Random(7)
 whole = 0
@@ -175,7 +175,7 @@ for attempt in range(12):  # killed in its first, second or third episode, or a 
     os.waitpid(child, 0)
     told += len(os.read(heard, 65536))
     os.close(heard)
-    there = len(episodes(folder)) if (folder / "meta").exists() else 0
+    there = len(episodes(folder)) if begun(folder) else 0
     assert whole + told <= there <= whole + told + 1, (whole, told, there)
     for number in range(whole, there):
         assert same(read_episode(folder, number), drive(number, 2)), number

@@ -26,7 +26,7 @@ from toddle.navigate.driver import Driver
 from toddle.navigate.scenarios import draw_rooms
 from toddle.navigate.scenarios.rooms import SCENARIOS, Room, Scenario, Split, Style
 from toddle.navigate.scenarios.starts import DRAWN, Start, some_start
-from toddle.outside.dataset.reader import episodes, facts_of
+from toddle.outside.dataset.reader import begun, episodes, facts_of
 from toddle.outside.dataset.rows import Damaged
 from toddle.outside.navigation.physics_batch import Recipe
 from toddle.outside.navigation.room_eyes import EyeOptions
@@ -97,7 +97,7 @@ def errands(
 def missing(folder: Path, wanted: Sequence[Errand], called: str) -> tuple[Errand, ...]:
     """Those that a dataset does not have yet."""
     have = set()
-    for number in episodes(folder) if (folder / "meta").exists() else ():
+    for number in episodes(folder) if begun(folder) else ():
         try:
             facts = facts_of(folder, number)
         except Damaged:

@@ -15,6 +15,11 @@ from toddle.outside.dataset.pictures import read_video
 from toddle.outside.dataset.rows import Damaged, Facts, read_facts, read_rows
 
 
+def begun(folder: Path) -> bool:
+    """Whether a dataset is here, if only an empty one."""
+    return bool(layout.numbers(folder)) or _told(folder) is not None
+
+
 def episodes(folder: Path) -> tuple[int, ...]:
     """The numbers of all episodes that there are or should be, from 0.
 
