@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float32, UInt8
+from jaxtyping import Bool, UInt8
 
 from toddle.failures import BadInput
 from toddle.geometry.camera import RectifiedCameras
@@ -145,7 +145,7 @@ def _without_edges(found: Found, edge: float) -> Found:
     return Found(found.disparity, np.where(apart > np.float32(edge), np.float32(0), found.confidence))
 
 
-def _smaller(picture: Grey, share: int) -> Grey:
+def _smaller(picture: Grey, share: int) -> UInt8[np.ndarray, "less fewer"]:
     if share == 1:
         return picture
     size = (picture.shape[1] // share, picture.shape[0] // share)
@@ -171,5 +171,5 @@ def _shrunk(found: Found, size: tuple[int, int], scale: float) -> Found:
         for one in (found.disparity * found.confidence, found.confidence)
     )
     known = weight > 0
-    mean: Float32[np.ndarray, "rows columns"] = np.divide(weighted, weight, out=np.zeros_like(weight), where=known)
+    mean = np.divide(weighted, weight, out=np.zeros_like(weight), where=known)
     return Found(mean * np.float32(scale), weight)
