@@ -50,6 +50,8 @@ def judge_in_rooms(asked: Evaluate) -> int:
             **figures_of([drive.finish for drive in drives]),
         }  # fmt: skip
         _leave(folder, figures, drives, f"{recipe.robot}, {asked.policy or asked.driver}")
+    if not asked.json:
+        _tell_scenarios(figures)
     tell(figures, folder, as_json=asked.json)
     return _INTERRUPTED if stop.asked else 0
 
@@ -74,6 +76,24 @@ def _driver(asked: Evaluate) -> tuple[Recipe, bool]:
     recipe = Recipe(cloned, (asked.policy,), asked.robot or "heicub", asked.config)
     _ = cloned(load_humanoid(recipe.robot, recipe.config), asked.policy)
     return recipe, True
+
+
+def _tell_scenarios(figures: dict[str, Any]) -> None:
+    """A line for each scenario."""
+    from toddle.navigate.scenarios.rooms import SCENARIOS
+    from toddle.outside.terminal import print_table
+
+    head = ("", "reached", "95 %", "SPL", "collisions", "falls", "late", "time [s]", "ZMP error [cm]")
+    rows = []
+    for name in SCENARIOS:
+        if name in figures:
+            one = figures[name]
+            won = round(one["success_rate"] * one["episodes"])
+            between = f"{100 * one['wilson_low']:.1f} to {100 * one['wilson_high']:.1f} %"
+            counts = [str(one[what]) for what in ("collisions", "falls", "late")]
+            means = [f"{one['seconds_mean']:.1f}", f"{one['zmp_error_mean_cm']:.2f}"]
+            rows.append((name, f"{won} of {one['episodes']}", between, f"{one['spl']:.2f}", *counts, *means))
+    print_table("rooms", head, rows)
 
 
 def _leave(folder: Path, figures: dict[str, Any], drives: list[Drive], title: str) -> None:
