@@ -91,8 +91,10 @@ class DocumentMatching:
         inside = (columns >= 0) & (there >= 0)
         columns = np.clip(columns, 0, left.shape[1] - 1)
         agree = inside & (np.abs(there + back[rows, columns]) < np.float32(_AGREE))
-        sure = np.where(agree, np.minimum(sure, sure_back[rows, columns]), np.float32(0))
         half = self.window // 2
+        both = np.where(agree, np.minimum(sure, sure_back[rows, columns]), np.float32(0))
+        unchecked = columns > left.shape[1] - self.disparities - half  # nothing was looked for from there
+        sure = np.where(unchecked, sure, both)
         sure[:, : self.disparities - 1 + half] = 0  # not every disparity was looked for there
         sure[:half], sure[-half:], sure[:, -half:] = 0, 0, 0
         return Found(np.where(sure > 0, there, np.float32(0)), sure)
