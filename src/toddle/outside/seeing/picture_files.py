@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import UInt, UInt8
 
 from toddle.failures import BadInput
 from toddle.outside.files import write_bytes
@@ -53,8 +53,8 @@ def read_picture(path: Path) -> UInt8[np.ndarray, "rows columns 3"]:
     return picture.astype(np.uint8)
 
 
-def write_picture(path: Path, picture: UInt8[np.ndarray, "rows columns *colours"]) -> None:
-    """Write a PNG."""
+def write_picture(path: Path, picture: UInt[np.ndarray, "rows columns *colours"]) -> None:
+    """Write a PNG of 8 or 16 bits."""
     _, content = cv2.imencode(".png", picture)
     write_bytes(path, content.tobytes())
 
