@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import jax
@@ -25,6 +26,8 @@ from toddle.outside.navigation.cloning_files import (
     save_run,
 )
 from toddle.outside.navigation.export_cloned import export_cloned
+
+Answers = Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]
 
 
 def _policy(config: CloningConfig = LIGHT) -> Cloned:
@@ -129,17 +132,21 @@ def test_a_run_comes_back_bit_for_bit_and_the_newest_whole_one(tmp_path: Path) -
     assert load_run(tmp_path)[1] == 1
 
 
-def _onnx(path: Path):
+def _onnx(path: Path) -> Answers:
     import onnxruntime
 
     session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
     assert json.loads(session.get_modelmeta().custom_metadata_map["period_s"]) == 0.2
-    return lambda given: dict(
-        zip(("command", "next_memory"), session.run(["command", "next_memory"], given), strict=True)
-    )
+    names = ["command", "next_memory"]
+    return lambda given: dict(zip(names, [np.asarray(one) for one in session.run(names, given)], strict=True))
 
 
-def _jax(path: Path):
+def _jax(path: Path) -> Answers:
     exported = export.deserialize(bytearray(path.read_bytes()))
     assert json.loads(exported.fun_name)["period_s"] == 0.2
-    return lambda given: exported.call(*map(jnp.asarray, given.values()))
+
+    def answered(given: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        found: dict[str, jax.Array] = exported.call(*map(jnp.asarray, given.values()))  # pyright: ignore
+        return {name: np.asarray(value) for name, value in found.items()}
+
+    return answered

@@ -11,11 +11,12 @@ import pytest
 from small_networks import DOCUMENT, LIGHT, NETWORKS, episodes
 
 from toddle.failures import BadInput
+from toddle.navigate.cloning.batches import Batch
 from toddle.navigate.cloning.config import CloningConfig, document
 from toddle.navigate.cloning.driver import Clone
 from toddle.navigate.cloning.network import network, unrolled, velocity
 from toddle.navigate.cloning.policy import Cloned
-from toddle.navigate.cloning.training import _given, begin, felt_shares, next_batch
+from toddle.navigate.cloning.training import _given, begin, felt_shares
 from toddle.navigate.driver import Driver, Situation
 from toddle.navigate.sight import Sight
 from toddle.signals import Velocity
@@ -44,9 +45,9 @@ def _steered(policy: Cloned, number: int = 0, looks: int = 5) -> list[list[float
 def test_steering_is_what_was_learned(config: CloningConfig) -> None:
     """Look by look with a memory, against all looks at once as in training."""
     policy, one = _policy(config), episodes()[0]
-    batch, _ = next_batch(begin(config, [one], 0).order, config, [one])
-    parts = (part[None, :5] for part in one[1:])
-    batch = type(batch)(*parts, np.arange(5)[None] == 0, np.ones((1, 5), np.float32))
+    picture, depth, felt, taught, labels = (part[None, :5] for part in one[1:])
+    fresh, weight = np.arange(5)[None] == 0, np.ones((1, 5), np.float32)
+    batch = Batch(picture, depth, felt, taught, labels, fresh, weight)
     given = _given(config, policy.scale, batch, None)
     features = policy.network.features(given.frames[0], given.felt[0])[None]
     remembered, _ = unrolled(policy.network, features, given.fresh, jnp.zeros((1, 2, config.units), jnp.float32))
@@ -79,7 +80,7 @@ def test_the_document_sees_the_last_five_looks_alone() -> None:
     policy, one = _policy(DOCUMENT), episodes()[3]
     said = []
     for first in (0, 2):
-        memory = policy.start()
+        memory, found = policy.start(), jnp.zeros(2)
         for look in range(first, 8):
             depth = jnp.asarray(one.depth[look] / 1000.0, jnp.float32)
             found, memory = policy(jnp.asarray(one.picture[look]), depth, jnp.asarray(one.felt[look]), memory)
