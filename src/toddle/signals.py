@@ -58,6 +58,10 @@ class Velocity(NamedTuple):
     omega: float
 
 
+STILL = Velocity(0.0, 0.0, 0.0)
+"""The command to stand."""
+
+
 class Circle(NamedTuple):
     """An obstacle on the floor, a tall cylinder: its centre and radius in the world [m]."""
 

@@ -45,8 +45,7 @@ from toddle.outside.simulation.disturbances import Noise, WorldOptions
 from toddle.outside.teleoperation.commands import follow
 from toddle.robots.humanoid import Humanoid
 from toddle.robots.humanoids import load_humanoid
-from toddle.signals import Circle, Velocity
-from toddle.walk.gate import STILL
+from toddle.signals import STILL, Circle, Velocity
 from toddle.walk.scenarios import Leg
 
 TASK = WalkerTask(unicycle(seconds=0.1), hold=4, circles=3, people=2, observe="full", rays=6)

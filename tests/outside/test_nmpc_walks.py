@@ -17,8 +17,8 @@ from toddle.navigate.walks import Walks
 from toddle.outside.navigation import nmpc_walks as module
 from toddle.outside.navigation.nmpc_walks import nmpc_walks
 from toddle.robots.gait import Gait
-from toddle.signals import Circle, Velocity
-from toddle.walk.gate import STILL, gate
+from toddle.signals import STILL, Circle, Velocity
+from toddle.walk.gate import gate
 from toddle.walk.pattern.reduced import Reduced
 
 NONE = jnp.zeros((0, 3))

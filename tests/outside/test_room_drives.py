@@ -30,8 +30,7 @@ from toddle.outside.navigation.room_run import RoomFinish, RoomRules, run_room
 from toddle.outside.simulation.rooms import room_simulation
 from toddle.robots.humanoid import Humanoid
 from toddle.robots.humanoids import load_humanoid
-from toddle.signals import Velocity
-from toddle.walk.gate import STILL
+from toddle.signals import STILL, Velocity
 from toddle.walk.walker import Walker, walker
 
 CAST = EyeOptions("cast")

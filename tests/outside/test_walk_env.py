@@ -21,8 +21,8 @@ from toddle.outside.environment.walk import WalkEnv
 from toddle.outside.simulation.disturbances import Noise, WorldOptions
 from toddle.outside.simulation.humanoid import HumanoidSimulation
 from toddle.robots.humanoids import load_humanoid
-from toddle.signals import Velocity
-from toddle.walk.gate import STILL, gate
+from toddle.signals import STILL, Velocity
+from toddle.walk.gate import gate
 from toddle.walk.walker import walker
 
 FASTEST = Velocity(0.3, 0.1, 0.3)

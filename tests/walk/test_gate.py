@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from toddle.signals import Velocity
-from toddle.walk.gate import ACCELERATION, SILENCE, STILL, TURNING, gate
+from toddle.signals import STILL, Velocity
+from toddle.walk.gate import ACCELERATION, SILENCE, TURNING, gate
 
 FASTEST = Velocity(0.3, 0.1, 0.3)
 DT = 0.01

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 
 from toddle.robots.gait import Gait
 from toddle.robots.humanoid import LEFT, RIGHT
-from toddle.signals import Velocity
+from toddle.signals import STILL, Velocity
 from toddle.walk.config import WalkConfig
-from toddle.walk.gate import STILL
 from toddle.walk.landing import bounds, clear_of, dcm_of, within_reach
 from toddle.walk.pattern.displacement import rotate
 from toddle.walk.pattern.obstacles import clearance

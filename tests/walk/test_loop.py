@@ -9,8 +9,8 @@ import pytest
 
 from toddle.outside.simulation.humanoid import HumanoidSimulation
 from toddle.robots.humanoids import load_humanoid
-from toddle.signals import Circle, Senses, Velocity
-from toddle.walk.gate import ACCELERATION, STILL
+from toddle.signals import STILL, Circle, Senses, Velocity
+from toddle.walk.gate import ACCELERATION
 from toddle.walk.loop import Robot, walk
 from toddle.walk.state import Action, WalkerState
 from toddle.walk.walker import Walker, walker

@@ -6,8 +6,7 @@ import pytest
 
 from toddle.failures import BadInput
 from toddle.robots.gait import Gait
-from toddle.signals import Velocity
-from toddle.walk.gate import STILL
+from toddle.signals import STILL, Velocity
 from toddle.walk.scenarios import SCENARIOS, Leg, scenario_named, velocity_at
 
 GAIT = Gait(com_height=0.45, foot_distance=0.14, foot_length=0.2, foot_width=0.1)

@@ -12,9 +12,8 @@ from scipy.integrate import solve_ivp
 
 from toddle.robots.gait import Gait
 from toddle.robots.humanoid import LEFT, RIGHT
-from toddle.signals import Velocity
+from toddle.signals import STILL, Velocity
 from toddle.walk.config import WalkConfig
-from toddle.walk.gate import STILL
 from toddle.walk.pattern.displacement import rotate
 from toddle.walk.state import Landing, Pose
 from toddle.walk.stepping import (

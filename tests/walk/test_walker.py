@@ -14,9 +14,8 @@ from toddle.outside.simulation.disturbances import WorldOptions
 from toddle.outside.simulation.humanoid import HumanoidSimulation
 from toddle.robots.humanoid import Humanoid
 from toddle.robots.humanoids import load_humanoid
-from toddle.signals import Circle, Velocity
+from toddle.signals import STILL, Circle, Velocity
 from toddle.walk.config import WalkConfig
-from toddle.walk.gate import STILL
 from toddle.walk.loop import CommandSource, Moment, walk
 from toddle.walk.pattern.plan import Status
 from toddle.walk.state import Mode

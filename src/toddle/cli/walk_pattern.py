@@ -85,7 +85,7 @@ def _command(
     task: Task, gait: Gait, through: Callable[[Velocity], Velocity], allowed: list[Velocity]
 ) -> Callable[[float], Velocity]:
     """The velocity at each iteration, which is remembered in ``allowed``."""
-    from toddle.walk.gate import STILL
+    from toddle.signals import STILL
     from toddle.walk.scenarios import velocity_at
 
     def command(t: float) -> Velocity:
@@ -104,7 +104,8 @@ def _passed(velocity: Velocity) -> Velocity:
 
 def _capped(gait: Gait) -> Callable[[Velocity], Velocity]:
     """Ours, within what the robot may be asked and its steps can follow."""
-    from toddle.walk.gate import STILL, gate
+    from toddle.signals import STILL
+    from toddle.walk.gate import gate
     from toddle.walk.pattern.feasible import cap
 
     return lambda velocity: cap(gate(STILL, velocity, gait.fastest, gait.sample, limited=False), gait)

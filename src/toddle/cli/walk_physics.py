@@ -85,7 +85,8 @@ def walk_in_physics(asked: Walk) -> int:
 
 def _capped(gait: Gait) -> Callable[[Velocity], Velocity]:
     """What the safety gate lets through in the end."""
-    from toddle.walk.gate import STILL, gate
+    from toddle.signals import STILL
+    from toddle.walk.gate import gate
 
     return lambda velocity: gate(STILL, velocity, gait.fastest, gait.sample, limited=False)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from toddle.signals import Velocity
+from toddle.signals import STILL, Velocity
 
 ACCELERATION = 0.3
 """The fastest that a commanded velocity changes [m/s^2]; a choice of ours."""
@@ -21,9 +21,6 @@ falls at two thirds."""
 
 SILENCE = 0.5
 """After so long without a word from whoever commands, the robot stops [s]."""
-
-STILL = Velocity(0.0, 0.0, 0.0)
-"""The command to stand."""
 
 
 def gate(

@@ -13,11 +13,11 @@ import numpy as np
 from jaxtyping import Float
 
 from toddle.robots.gait import Gait
-from toddle.signals import Circle, Reference, Senses, Velocity
+from toddle.signals import STILL, Circle, Reference, Senses, Velocity
 from toddle.walk.balance import support
 from toddle.walk.balance.estimate import Estimate
 from toddle.walk.config import TICK
-from toddle.walk.gate import STILL, gate
+from toddle.walk.gate import gate
 from toddle.walk.state import Action, Landing, Mode
 from toddle.walk.stepping import achieved
 

@@ -10,12 +10,11 @@ import math
 
 from toddle.robots.gait import Gait
 from toddle.robots.humanoid import LEFT, RIGHT
-from toddle.signals import Velocity
+from toddle.signals import STILL, Velocity
 from toddle.walk.balance import support
 from toddle.walk.balance.estimate import Estimate
 from toddle.walk.balance.pendulum import Pair
 from toddle.walk.config import TICK, WalkConfig
-from toddle.walk.gate import STILL
 from toddle.walk.landing import dcm_of
 from toddle.walk.pattern.displacement import rotate
 from toddle.walk.state import Landing, Mode, Pose, WalkerState, pose_of

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from toddle.failures import unknown_name
-from toddle.signals import Circle, Velocity
-from toddle.walk.gate import STILL
+from toddle.signals import STILL, Circle, Velocity
 
 
 class Leg(NamedTuple):

@@ -7,11 +7,10 @@ from typing import NamedTuple
 
 from toddle.robots.gait import Gait
 from toddle.robots.humanoid import LEFT, RIGHT
-from toddle.signals import Velocity
+from toddle.signals import STILL, Velocity
 from toddle.walk.balance import support
 from toddle.walk.balance.pendulum import Pair, offset, timing
 from toddle.walk.config import WalkConfig
-from toddle.walk.gate import STILL
 from toddle.walk.pattern.displacement import displacements, rotate
 from toddle.walk.pattern.nmpc_problem import apart
 from toddle.walk.state import Landing, Mode, Pose, Step, WalkerState, pose_of

@@ -16,12 +16,11 @@ import numpy as np
 
 from toddle.robots.gait import Gait
 from toddle.robots.humanoid import LEFT, RIGHT, Humanoid
-from toddle.signals import Circle, Reference, Senses, Velocity
+from toddle.signals import STILL, Circle, Reference, Senses, Velocity
 from toddle.walk.balance import support
 from toddle.walk.balance.estimate import Estimate, Observer, estimate, observer
 from toddle.walk.balance.pendulum import Pair
 from toddle.walk.config import TICK, WalkConfig
-from toddle.walk.gate import STILL
 from toddle.walk.landing import adjusted
 from toddle.walk.modes import changed
 from toddle.walk.pattern.feasible import cap

@@ -15,8 +15,7 @@ from toddle.navigate.cloning.expert import Expert, Known
 from toddle.navigate.driver import Driver, Situation
 from toddle.navigate.scenarios.rooms import Hall
 from toddle.navigate.sight import PERIOD, Showing
-from toddle.signals import Velocity
-from toddle.walk.gate import STILL
+from toddle.signals import STILL, Velocity
 
 HALL = Hall(0.0, 0.0, 0.0, (4.0, 4.0), 2.5, 0, 0, (0, 0, 0, 0), ())
 HALF_VIEW = math.radians(34.0)

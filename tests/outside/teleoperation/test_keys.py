@@ -19,8 +19,7 @@ from hypothesis import strategies as st
 
 from toddle.failures import BadInput
 from toddle.outside.teleoperation.keys import LOST, QUIT, TOLD, Keyboard, keys_in, pressed
-from toddle.signals import Velocity
-from toddle.walk.gate import STILL
+from toddle.signals import STILL, Velocity
 
 FASTEST = Velocity(0.3, 0.1, 0.3)
 

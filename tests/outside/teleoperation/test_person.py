@@ -18,8 +18,7 @@ from toddle.navigate.sight import COLUMNS, PERIOD, ROWS, Sight
 from toddle.outside.teleoperation.keys import Keyboard
 from toddle.outside.teleoperation.person import Person
 from toddle.outside.teleoperation.seen import Seen, blocks, nearest, nearness
-from toddle.signals import Velocity
-from toddle.walk.gate import STILL
+from toddle.signals import STILL, Velocity
 
 FASTEST = Velocity(0.3, 0.1, 0.3)
 

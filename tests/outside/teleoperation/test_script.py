@@ -10,8 +10,7 @@ import pytest
 from toddle.failures import BadInput
 from toddle.outside.teleoperation.commands import follow, script_seconds, until
 from toddle.outside.teleoperation.script import read_script
-from toddle.signals import Velocity
-from toddle.walk.gate import STILL
+from toddle.signals import STILL, Velocity
 from toddle.walk.scenarios import Leg
 
 GOOD = (Leg(0.0, Velocity(0.1, 0.0, 0.0)), Leg(2.5, Velocity(0.0, -0.05, 0.1)), Leg(4.0, STILL))

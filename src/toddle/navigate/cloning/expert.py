@@ -19,8 +19,7 @@ from toddle.failures import BadInput
 from toddle.navigate.cloning.detour import first_corner, free_lengths, gaps
 from toddle.navigate.driver import Situation
 from toddle.navigate.sight import PERIOD, Showing
-from toddle.signals import Velocity
-from toddle.walk.gate import STILL
+from toddle.signals import STILL, Velocity
 
 _FEWEST = 6, 12  # pixels that show the target, and anything else
 _HEADINGS = np.linspace(-2.1, 2.1, 65)  # relative to where it wants to go [rad]

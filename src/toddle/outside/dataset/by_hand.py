@@ -17,7 +17,7 @@ from toddle.outside.teleoperation.person import Person
 from toddle.outside.teleoperation.seen import Seen
 from toddle.outside.walk_run import warm_up
 from toddle.robots.humanoids import load_humanoid
-from toddle.walk.gate import STILL
+from toddle.signals import STILL
 from toddle.walk.walker import walker
 
 _ENDS = {

@@ -6,19 +6,14 @@ its robot and drivers by itself, as in `toddle.outside.navigation.physics_batch`
 
 from __future__ import annotations
 
-import os
-import signal
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
-from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from toddle.failures import BadInput, ToddleError
+from toddle.failures import BadInput
 from toddle.navigate.cloning.expert import Expert
 from toddle.navigate.cloning.noisy import Noisy
 from toddle.navigate.cloning.recording import Recording, RoomKey
@@ -31,12 +26,11 @@ from toddle.outside.dataset.rows import Damaged
 from toddle.outside.navigation.physics_batch import Recipe
 from toddle.outside.navigation.room_eyes import EyeOptions
 from toddle.outside.navigation.room_run import RoomRules, run_room
-from toddle.outside.orphans import end_with_parent
+from toddle.outside.workers import shared
 from toddle.robots.humanoid import Humanoid
 from toddle.robots.humanoids import load_humanoid
 from toddle.walk.walker import walker
 
-_PATIENCE = 0.1  # between two looks whether to stop [s]
 _SEEDS = 1_000_000  # for each seed that is given
 
 
@@ -126,6 +120,13 @@ class Rider:
         self._driver = how.recipe.make(self._humanoid, *how.recipe.given)
         self._walker = walker(self._humanoid)
 
+    def __call__(self, errand: Errand) -> Recording | BadInput:
+        """One drive, or why there is none."""
+        try:
+            return self.record(errand)
+        except BadInput as fault:
+            return fault
+
     def record(self, errand: Errand) -> Recording:
         """One drive.
 
@@ -161,52 +162,5 @@ def record(
         BadInput: robot or driver can't be made.
         ToddleError: a process was killed.
     """
-    count = min(processes or len(os.sched_getaffinity(0)), len(wanted))
-    if count > 1:
-        yield from _shared(how, wanted, count, stopped)
-        return
-    rider = Rider(how)
-    for errand in wanted:
-        if stopped():
-            return
-        yield errand, _tried(rider, errand)
-
-
-def _tried(rider: Rider, errand: Errand) -> Recording | BadInput:
-    try:
-        return rider.record(errand)
-    except BadInput as fault:
-        return fault
-
-
-def _shared(how: How, wanted: Sequence[Errand], count: int, stopped: Callable[[], bool]) -> Iterator[Done]:
-    """Hands out drives one by one; those under way when it is to stop still count."""
-    left = list(reversed(wanted))
-    with ProcessPoolExecutor(count, get_context("spawn"), _begin, (how,)) as pool:
-        try:
-            waiting: dict[Future[Recording | BadInput], Errand] = {}
-            while waiting or (left and not stopped()):
-                while left and len(waiting) < count and not stopped():
-                    errand = left.pop()
-                    waiting[pool.submit(_one, errand)] = errand
-                done, _ = wait(waiting, timeout=_PATIENCE, return_when=FIRST_COMPLETED)
-                for future in done:
-                    yield waiting.pop(future), future.result()
-        except BrokenProcessPool:
-            raise ToddleError("a process was killed", where="physics", remedy="is there memory enough?") from None
-
-
-_told: list[How] = []  # a worker process was told
-_own: list[Rider] = []  # and made of it
-
-
-def _begin(how: How) -> None:
-    _ = signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started the processes hears it, and asks them to stop
-    end_with_parent()
-    _told.append(how)
-
-
-def _one(errand: Errand) -> Recording | BadInput:
-    if not _own:
-        _own.append(Rider(_told[0]))
-    return _tried(_own[0], errand)
+    for number, done in shared(Rider, (how,), wanted, processes=processes, stopped=stopped):
+        yield wanted[number], done

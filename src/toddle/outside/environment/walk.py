@@ -26,9 +26,8 @@ from toddle.outside.simulation.disturbances import TICK, WorldOptions
 from toddle.outside.simulation.humanoid import HumanoidSimulation, Truth
 from toddle.outside.simulation.pictures import Camera
 from toddle.robots.humanoids import load_humanoid
-from toddle.signals import Senses, Velocity
+from toddle.signals import STILL, Senses, Velocity
 from toddle.walk.config import WalkConfig
-from toddle.walk.gate import STILL
 from toddle.walk.loop import Moment, walk
 from toddle.walk.pattern.plan import Status
 from toddle.walk.walker import walker

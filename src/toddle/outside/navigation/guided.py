@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from toddle.navigate.driver import Situation
-from toddle.signals import Circle, Velocity
-from toddle.walk.gate import STILL
+from toddle.signals import STILL, Circle, Velocity
 from toddle.walk.guide import Guide, guide
 
 

@@ -20,8 +20,7 @@ from toddle.outside.navigation.course import Course, Finish, Rules, path_length,
 from toddle.outside.simulation.disturbances import TICK, WorldOptions
 from toddle.outside.simulation.humanoid import HumanoidSimulation, Truth
 from toddle.robots.humanoid import Humanoid
-from toddle.signals import Circle, Footstep, Senses, Velocity
-from toddle.walk.gate import STILL
+from toddle.signals import STILL, Circle, Footstep, Senses, Velocity
 from toddle.walk.loop import Moment, walk
 from toddle.walk.walker import Walker, walker
 

@@ -6,27 +6,20 @@ driver is made of, and frozen records.
 
 from __future__ import annotations
 
-import os
-import signal
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from toddle.failures import ToddleError
 from toddle.navigate.driver import Baseline, Driver, Learned
 from toddle.navigate.tasks.walker import WalkerTask
 from toddle.outside.navigation.course import Course, Finish, Rules
 from toddle.outside.navigation.nmpc_walks import nmpc_walks
 from toddle.outside.navigation.physics import Ready, run_course
 from toddle.outside.simulation.disturbances import WorldOptions
+from toddle.outside.workers import shared
 from toddle.robots.humanoid import Humanoid
 from toddle.robots.humanoids import load_humanoid
-
-_PATIENCE = 0.1  # between two looks whether to stop [s]
 
 
 @dataclass(frozen=True)
@@ -65,17 +58,13 @@ class _Worker:
         self._rules, self._world = rules, world
         self._ready: Ready | None = None
 
-    def finish(self, task: tuple[int, Course, int]) -> Finish:
+    def __call__(self, task: tuple[Course, int]) -> Finish:
         """One course."""
-        _, course, seed = task
+        course, seed = task
         finish, self._ready = run_course(
             self._humanoid, self._driver, course, self._rules, world=self._world, seed=seed, before=self._ready
         )
         return finish
-
-
-_told: list[tuple[Recipe, Rules | None, WorldOptions | None]] = []  # a worker process was told
-_own: list[_Worker] = []  # and made of it
 
 
 def run_courses(
@@ -108,54 +97,9 @@ def run_courses(
         BadInput: a driver or a course that can't be used.
         ToddleError: a process was killed.
     """
-    count = min(processes or len(os.sched_getaffinity(0)), len(courses))
-    tasks = [(number, course, seed + number) for number, course in enumerate(courses)]
+    tasks = [(course, seed + number) for number, course in enumerate(courses)]
     found: dict[int, Finish] = {}
-    if count <= 1:
-        worker = _Worker(recipe, rules, world)
-        for task in tasks:
-            if stopped():
-                break
-            found[task[0]] = worker.finish(task)
-            progress(task[0], found[task[0]])
-    else:
-        with ProcessPoolExecutor(count, get_context("spawn"), _begin, (recipe, rules, world)) as pool:
-            _shared(pool, tasks, found, progress, stopped)
+    for number, finish in shared(_Worker, (recipe, rules, world), tasks, processes=processes, stopped=stopped):
+        found[number] = finish
+        progress(number, finish)
     return tuple(found.get(number) for number in range(len(courses)))
-
-
-def _shared(
-    pool: ProcessPoolExecutor,
-    tasks: Sequence[tuple[int, Course, int]],
-    found: dict[int, Finish],
-    progress: Callable[[int, Finish], None],
-    stopped: Callable[[], bool],
-) -> None:
-    """Hands out the courses one by one, and takes what was under way when it is to stop."""
-    waiting: dict[Future[Finish], int] = {pool.submit(_one, task): task[0] for task in tasks}
-    try:
-        while waiting and not stopped():
-            done, _ = wait(waiting, timeout=_PATIENCE, return_when=FIRST_COMPLETED)
-            for future in done:
-                number = waiting.pop(future)
-                found[number] = future.result()
-                progress(number, found[number])
-    except BrokenProcessPool:
-        raise ToddleError("a process was killed", where="physics", remedy="is there memory enough?") from None
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-    for future, number in waiting.items():  # those that were under way have ended meanwhile
-        if not future.cancelled() and future.exception() is None:
-            found[number] = future.result()
-            progress(number, found[number])
-
-
-def _begin(recipe: Recipe, rules: Rules | None, world: WorldOptions | None) -> None:
-    _ = signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started the processes hears it, and asks them to stop
-    _told.append((recipe, rules, world))
-
-
-def _one(task: tuple[int, Course, int]) -> Finish:
-    if not _own:
-        _own.append(_Worker(*_told[0]))
-    return _own[0].finish(task)

@@ -5,28 +5,20 @@ Each process loads the robot and makes the driver by itself, as in `toddle.outsi
 
 from __future__ import annotations
 
-import os
-import signal
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
-from multiprocessing import get_context
 from typing import NamedTuple
 
-from toddle.failures import ToddleError
 from toddle.navigate.cloning.recording import Recording, RoomKey
 from toddle.navigate.scenarios.draw_rooms import room
 from toddle.navigate.scenarios.rooms import SCENARIOS, Scenario, Split, Style
 from toddle.outside.navigation.physics_batch import Recipe
 from toddle.outside.navigation.room_eyes import EyeOptions
 from toddle.outside.navigation.room_run import RoomFinish, RoomRules, run_room
-from toddle.outside.orphans import end_with_parent
 from toddle.outside.simulation.disturbances import WorldOptions
+from toddle.outside.workers import shared
 from toddle.robots.humanoids import load_humanoid
 from toddle.walk.walker import walker
-
-_PATIENCE = 0.1  # between two looks whether to stop [s]
 
 
 @dataclass(frozen=True)
@@ -73,7 +65,7 @@ class _Worker:
         self._driver = how.recipe.make(self._humanoid, *how.recipe.given)
         self._walker = walker(self._humanoid)
 
-    def drive(self, key: RoomKey) -> Drive:
+    def __call__(self, key: RoomKey) -> Drive:
         """One drive."""
         how, seen = self._how, key.number < self._how.kept
         finish, recording = run_room(
@@ -82,10 +74,6 @@ class _Worker:
             rules=how.rules, world=how.world, before=self._walker,
         )  # fmt: skip
         return Drive(finish, recording if seen else None)
-
-
-_told: list[Judged] = []  # a worker process was told
-_own: list[_Worker] = []  # and made of it
 
 
 def run_rooms(
@@ -112,54 +100,8 @@ def run_rooms(
         BadInput: a driver or a room that can't be used.
         ToddleError: a process was killed.
     """
-    count = min(processes or len(os.sched_getaffinity(0)), len(rooms))
     found: dict[int, Drive] = {}
-    if count <= 1:
-        worker = _Worker(how)
-        for number, key in enumerate(rooms):
-            if stopped():
-                break
-            found[number] = worker.drive(key)
-            progress(number, found[number])
-    else:
-        with ProcessPoolExecutor(count, get_context("spawn"), _begin, (how,)) as pool:
-            _shared(pool, rooms, found, progress, stopped)
+    for number, drive in shared(_Worker, (how,), rooms, processes=processes, stopped=stopped):
+        found[number] = drive
+        progress(number, drive)
     return tuple(found.get(number) for number in range(len(rooms)))
-
-
-def _shared(
-    pool: ProcessPoolExecutor,
-    rooms: Sequence[RoomKey],
-    found: dict[int, Drive],
-    progress: Callable[[int, Drive], None],
-    stopped: Callable[[], bool],
-) -> None:
-    """Hands out the rooms one by one, and takes what was under way when it is to stop."""
-    waiting: dict[Future[Drive], int] = {pool.submit(_one, key): number for number, key in enumerate(rooms)}
-    try:
-        while waiting and not stopped():
-            done, _ = wait(waiting, timeout=_PATIENCE, return_when=FIRST_COMPLETED)
-            for future in done:
-                number = waiting.pop(future)
-                found[number] = future.result()
-                progress(number, found[number])
-    except BrokenProcessPool:
-        raise ToddleError("a process was killed", where="physics", remedy="is there memory enough?") from None
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-    for future, number in waiting.items():  # those that were under way have ended meanwhile
-        if not future.cancelled() and future.exception() is None:
-            found[number] = future.result()
-            progress(number, found[number])
-
-
-def _begin(how: Judged) -> None:
-    _ = signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started the processes hears it, and asks them to stop
-    end_with_parent()
-    _told.append(how)
-
-
-def _one(key: RoomKey) -> Drive:
-    if not _own:
-        _own.append(_Worker(_told[0]))
-    return _own[0].drive(key)

@@ -12,7 +12,6 @@ import time
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 from jaxtyping import Float
 
@@ -27,11 +26,10 @@ from toddle.outside.navigation.course import path_length
 from toddle.outside.navigation.room_eyes import EyeOptions, Eyes
 from toddle.outside.simulation.disturbances import TICK, WorldOptions
 from toddle.outside.simulation.humanoid import HumanoidSimulation, Truth
-from toddle.outside.simulation.rooms import room_simulation
+from toddle.outside.simulation.rooms import room_simulation, touched_kind
 from toddle.outside.simulation.stereo_cameras import CastCamera
 from toddle.robots.humanoid import Humanoid
-from toddle.signals import Circle, Senses, Velocity
-from toddle.walk.gate import STILL
+from toddle.signals import STILL, Circle, Senses, Velocity
 from toddle.walk.loop import Moment, walk
 from toddle.walk.walker import Walker, walker
 
@@ -338,7 +336,7 @@ class _Judge:
         if truth.fallen or moment.fell or not math.isfinite(x + y):
             self.outcome = Outcome.FELL
         elif touched:
-            self.outcome, self.touched = Outcome.COLLIDED, self._what()
+            self.outcome, self.touched = Outcome.COLLIDED, touched_kind(self.simulation, self.room)
         elif not self.over and moment.t > self.rules.seconds - TICK / 2:
             self.outcome = Outcome.LATE
         return self.outcome != Outcome.GOES_ON
@@ -346,18 +344,6 @@ class _Judge:
     def _left(self) -> float:
         place = self.simulation.data.site("waist").xpos
         return math.dist((place[0], place[1]), (self.room.target.x, self.room.target.y))
-
-    def _what(self) -> str:
-        """The kind of what the robot touches now."""
-        model, data = self.simulation.model, self.simulation.data
-        for geom in data.contact.geom[: data.ncon].ravel().tolist():
-            name = str(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom) or "")
-            if name.startswith("thing"):
-                number = int(name.removeprefix("thing").split("_")[0])
-                return "wall" if number == 0 else self.room.standing[number - 1].kind
-            if name.startswith("obstacle"):
-                return "person"
-        return "something"
 
     def finish(
         self,

@@ -18,8 +18,7 @@ from toddle.outside.simulation.humanoid import HumanoidSimulation
 from toddle.outside.teleoperation.commands import follow, script_seconds
 from toddle.outside.teleoperation.script import read_script
 from toddle.robots.humanoid import Humanoid
-from toddle.signals import Circle, Senses, Velocity
-from toddle.walk.gate import STILL
+from toddle.signals import STILL, Circle, Senses, Velocity
 
 
 class Steered:

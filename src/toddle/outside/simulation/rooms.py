@@ -33,6 +33,7 @@ LEFT, RIGHT = "left_chest_camera", "right_chest_camera"
 """Names of the cameras, where the robot's eyes are, looking down."""
 
 _EYES = "left_eye", "right_eye"
+_THING = "thing"  # begins the names of what is touched
 _SOLID = 3  # stops soles and shells, as the world's obstacles do
 _ZNEAR, _ZFAR = 0.03, 25.0  # [m]
 
@@ -62,6 +63,24 @@ def room_simulation(
     return HumanoidSimulation(humanoid, replace(options, circles=circles), lambda spec: _furnish(spec, room, pitch))
 
 
+def touched_kind(simulation: HumanoidSimulation, room: Room) -> str:
+    """The kind of what the robot touches now, such as wall, person, chair; something: what has no name.
+
+    Args:
+        simulation: made by `room_simulation`.
+        room: of the simulation.
+    """
+    model, data = simulation.model, simulation.data
+    for geom in data.contact.geom[: data.ncon].ravel().tolist():
+        name = str(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, geom) or "")
+        if name.startswith(_THING):
+            number = int(name.removeprefix(_THING).split("_")[0])
+            return "wall" if number == 0 else room.standing[number - 1].kind
+        if name.startswith(OBSTACLE.format("")):
+            return "person"
+    return "something"
+
+
 def _furnish(spec: Any, room: Room, pitch: float) -> None:
     spec.geom("floor").group = TOUCHED
     for number, surface in enumerate(room.surfaces):
@@ -71,7 +90,7 @@ def _furnish(spec: Any, room: Room, pitch: float) -> None:
     for number, thing in enumerate((hall, *room.standing)):
         for place, part in enumerate(thing.parts):
             if number or 0 < part.middle[2] < room.hall.height:  # the floor is there, and nobody reaches the ceiling
-                _solid(spec, f"thing{number}_{place}", thing, part)
+                _solid(spec, f"{_THING}{number}_{place}", thing, part)
     for number, person in enumerate(room.people):
         body = spec.body(OBSTACLE.format(number))
         spec.geom(OBSTACLE.format(number)).group = TOUCHED

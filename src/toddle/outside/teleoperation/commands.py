@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from toddle.signals import Velocity
-from toddle.walk.gate import STILL
+from toddle.signals import STILL, Velocity
 from toddle.walk.scenarios import Leg, velocity_at
 
 Source = Callable[[float], Velocity | None]

@@ -21,8 +21,8 @@ from types import FrameType
 from typing import Any
 
 from toddle.failures import BadInput
-from toddle.signals import Velocity
-from toddle.walk.gate import SILENCE, STILL
+from toddle.signals import STILL, Velocity
+from toddle.walk.gate import SILENCE
 
 HELP = """\
 up, down or w, s      faster, slower      left, right or a, d   turn
