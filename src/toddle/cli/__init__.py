@@ -26,7 +26,7 @@ COMMANDS = {
     "reach": "an arm learns to reach, and is asked to",
     "walk": "a humanoid walks, by itself or under your keys",
     "navigate": "the humanoid learns to find its way",
-    "see": "two cameras, calibrated and rectified",
+    "see": "two cameras: calibrated, rectified, and how far everything is",
     "experiment": "a document's table or figure, ours beside theirs",
     "doctor": "what this machine has, and lacks",
 }
