@@ -189,14 +189,13 @@ def _parts(
     asked: Clone, folder: Path, config: CloningConfig, source: dict[str, Any], stop: Stop
 ) -> tuple[Gather, Judge | None, Plan]:
     """Where episodes come from, who judges, and the plan."""
-    from toddle.navigate.cloning.episodes import episode
     from toddle.outside.navigation.cloning_drives import Aggregation, judge, kept
     from toddle.outside.navigation.cloning_run import Plan
 
     drives, told = _drives(asked), _teller(asked)
     judging = judge(drives, asked.judged, lambda: stop.asked, told) if asked.judged else None
     if asked.dataset is not None:
-        episodes = tuple(map(episode, kept(asked.dataset)))
+        episodes = kept(asked.dataset)
         plan = Plan(folder, (config.passes,), source, asked.seed)
         return (lambda number, policy: episodes), judging, plan
     course = _course(asked)

@@ -104,8 +104,7 @@ class Aggregation:
                 self._drive(before, policy, writer)
         if self.stopped():
             return None
-        found = kept(folder, self._wanted(number))
-        return tuple(map(episode, found))
+        return kept(folder, self._wanted(number))
 
     def _drive(self, number: int, policy: Cloned | None, writer: Writer) -> None:
         stage = self.course.stages[number]
@@ -139,8 +138,8 @@ class Aggregation:
         return {(_called(stage, at), one) for at, stage in enumerate(stages) for one in self._errands(stage)}
 
 
-def kept(folder: Path, wanted: set[tuple[str, Errand]] | None = None) -> list[Recording]:
-    """A dataset's recordings, in its order; what is damaged is left out.
+def kept(folder: Path, wanted: set[tuple[str, Errand]] | None = None) -> tuple[Episode, ...]:
+    """A dataset's episodes, in its order; what is damaged is left out.
 
     Args:
         folder: of the dataset.
@@ -149,9 +148,11 @@ def kept(folder: Path, wanted: set[tuple[str, Errand]] | None = None) -> list[Re
     Raises:
         BadInput: there is no dataset here, or nothing in it can be read.
     """
-    found = [one for _, one in read_dataset(folder, lambda fault: None)]
-    if wanted is not None:
-        found = [one for one in found if (one.driver, Errand(one.room, one.seed)) in wanted]
+    found = tuple(
+        episode(one)
+        for _, one in read_dataset(folder, lambda fault: None)
+        if wanted is None or (one.driver, Errand(one.room, one.seed)) in wanted
+    )
     if not found:
         raise BadInput("it holds no episode that can be read", where=str(folder), remedy="record some")
     return found
