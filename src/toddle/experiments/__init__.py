@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from toddle.experiments.experiment import Experiment
 
 NAMES = (
+    "huber-cloning",
     "huber-patterns",
     "huber-ppo-toy",
     "huber-ppo-walker",

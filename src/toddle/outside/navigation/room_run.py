@@ -70,6 +70,7 @@ class RoomFinish:
         zmp_spread: its standard deviation over the drive [m].
         asked: the velocity that was asked for at each look.
         inference_ms: how long the driver took for each decision [ms].
+        zmp_errors: the distance of planned and measured zero moment point at each tick [m].
     """
 
     room: RoomKey
@@ -84,6 +85,7 @@ class RoomFinish:
     zmp_spread: float
     asked: Float[np.ndarray, "decisions 3"]
     inference_ms: Float[np.ndarray, " inferences"]
+    zmp_errors: Float[np.ndarray, " ticks"] = field(default_factory=lambda: np.zeros(0))
 
     @property
     def spl(self) -> float:
@@ -374,4 +376,5 @@ class _Judge:
             float(np.std(self.errors)) if self.errors else math.nan,
             asked,
             took,
+            np.array(self.errors, np.float32),
         )
