@@ -17,11 +17,13 @@ QUICK = ("--judged", "0", "--json", "--passes", "600")
 
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Drives that nobody drove."""
+    """Drives that nobody drove; of the fifth there is only half."""
     folder = tmp_path_factory.mktemp("drives") / "set"
     with Writer(folder) as writer:
         for seed in range(8):
             writer.add(drive(seed))
+    fifth = sorted(folder.glob("data/**/*.parquet"))[4]
+    fifth.write_bytes(fifth.read_bytes()[: fifth.stat().st_size // 2])
     return folder
 
 
@@ -30,8 +32,11 @@ def test_a_policy_is_learned_from_a_dataset_and_exported(
 ) -> None:
     folder = tmp_path / "run"
     assert main(["navigate", "clone", str(dataset), *QUICK, "--out", str(folder)]) == 0
-    figures = json.loads(capsys.readouterr().out)
+    said = capsys.readouterr()
+    figures = json.loads(said.out)
     assert figures["passes"] == 512
+    assert [line.split(":")[0] for line in said.err.splitlines()] == ["toddle"]
+    assert said.err.rstrip().endswith("left out")
     assert is_cloned(folder)
     assert load_cloned(folder).source["dataset"] == str(dataset)
     assert main(["navigate", "export", str(tmp_path / "policy.onnx"), "--policy", str(folder)]) == 0

@@ -195,7 +195,7 @@ def _parts(
     drives, told = _drives(asked), _teller(asked)
     judging = judge(drives, asked.judged, lambda: stop.asked, told) if asked.judged else None
     if asked.dataset is not None:
-        episodes = kept(asked.dataset)
+        episodes = kept(asked.dataset, damaged=lambda fault: print(f"toddle: {fault.line}; left out", file=sys.stderr))
         plan = Plan(folder, (config.passes,), source, asked.seed)
         return (lambda number, policy: episodes), judging, plan
     course = _course(asked)

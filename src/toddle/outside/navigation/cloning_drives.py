@@ -21,6 +21,7 @@ from toddle.navigate.scenarios.rooms import SCENARIOS
 from toddle.navigate.task import Outcome
 from toddle.outside.dataset.drives import Errand, How, expert, missing, record
 from toddle.outside.dataset.reader import read_dataset
+from toddle.outside.dataset.rows import Damaged
 from toddle.outside.dataset.writer import Writer
 from toddle.outside.navigation.cloned import cloned
 from toddle.outside.navigation.cloning_files import save_cloned
@@ -138,19 +139,24 @@ class Aggregation:
         return {(_called(stage, at), one) for at, stage in enumerate(stages) for one in self._errands(stage)}
 
 
-def kept(folder: Path, wanted: set[tuple[str, Errand]] | None = None) -> tuple[Episode, ...]:
+def kept(
+    folder: Path,
+    wanted: set[tuple[str, Errand]] | None = None,
+    damaged: Callable[[Damaged], None] = lambda fault: None,
+) -> tuple[Episode, ...]:
     """A dataset's episodes, in its order; what is damaged is left out.
 
     Args:
         folder: of the dataset.
         wanted: only these drives; None: all.
+        damaged: is told of each that is left out.
 
     Raises:
         BadInput: there is no dataset here, or nothing in it can be read.
     """
     found = tuple(
         episode(one)
-        for _, one in read_dataset(folder, lambda fault: None)
+        for _, one in read_dataset(folder, damaged)
         if wanted is None or (one.driver, Errand(one.room, one.seed)) in wanted
     )
     if not found:
