@@ -29,7 +29,7 @@ from toddle.outside.navigation.room_judging import figures_of
 from toddle.outside.navigation.room_run import RoomFinish
 
 TINY = experiment.Parameters(
-    seeds=1, scenarios=("straight",), course=Course(1, 0, 1, 16), judged=0, drives=1, validation=1,
+    seeds=1, scenarios=("straight",), course=Course(1, 0, 1, LIGHT.passes), judged=0, drives=1, validation=1,
     eyes=EyeOptions("cast"), seconds=1.0, kinds=(), jobs=1,
 )  # fmt: skip
 
@@ -67,9 +67,11 @@ def test_what_was_learned_is_judged_again_with_the_same_figures(
 ) -> None:
     folder, first, _ = learned
     monkeypatch.setattr(experiment, "QUICK", TINY)
+    monkeypatch.setattr(experiment, "FULL", TINY)
     again = experiment.run(task(tmp_path, folder))
     assert again.figures["looks"] == first.figures["looks"]
     assert again.figures["balance"] == first.figures["balance"]
+    assert again.figures["networks"] == ["light-0"]
     assert not (tmp_path / "light-0").exists()
 
 

@@ -86,7 +86,7 @@ class Parameters:
 
 FULL = Parameters()
 QUICK = Parameters(
-    seeds=1, course=Course(10, 1, 5, 8192), judged=0, drives=1, validation=1, eyes=EyeOptions("cast"), seconds=40.0,
+    seeds=1, course=Course(6, 1, 3, 4096), judged=0, drives=1, validation=1, eyes=EyeOptions("cast"), seconds=45.0,
     kinds=(),
 )  # fmt: skip
 
@@ -97,6 +97,9 @@ def run(task: Task) -> Outcome:
     if task.seeds is not None:
         parameters = replace(parameters, seeds=task.seeds)
     learned = _learned_or_given(task.part(0.0, 0.3), parameters)
+    if task.data is not None:
+        eyes = EyeOptions("cast" if load_cloned(learned[0]).source.get("eyes") == "cast" else "stereo")
+        parameters = replace(parameters, seeds=len(learned), eyes=eyes, seconds=FULL.seconds)
     alike = _at_looks(task.part(0.3, 0.4), parameters, learned)
     expert, each, unseen = _driven(task.part(0.4, 0.7), parameters, learned)
     seen = [finish for those in each for finish in those]
@@ -118,7 +121,8 @@ def run(task: Task) -> Outcome:
     rows += [Row(f"{name}, reached", 100 * one["success_rate"], None, "%") for name, one in compared.items()]
     verdict, holds = tables.verdict(figures, balance)
     if not task.full:
-        verdict += f"; so few drives, and networks of {parameters.course.passes:,} looks, prove nothing"
+        looks = "" if task.data is not None else f", and a network of {parameters.course.passes:,} looks,"
+        verdict += f"; so few drives{looks} prove nothing"
     return Outcome(tuple(rows), verdict, holds, parameters, figures)
 
 
@@ -128,11 +132,17 @@ class _Teller:
     def __init__(self, task: Task, passes: int, name: str) -> None:
         from toddle.outside.terminal import Stop
 
-        self._task, self._passes, self._name, self.stop = task, passes, name, Stop()
+        self._task, self._passes, self._name, self._share, self.stop = task, passes, name, 0.0, Stop()
 
     def tell(self, done: int, news: str) -> None:
+        """So many looks were learned from."""
         self.stop.asked = self._task.stopped()
-        self._task.tell(min(done / self._passes, 1.0), f"{self._name}: {news}")
+        self._share = min(done / self._passes, 1.0)
+        self._task.tell(self._share, f"{self._name}: {news}")
+
+    def drove(self, made: int, wanted: int, reached: int, called: str) -> None:
+        """One drive more was driven to learn from, or to judge by."""
+        self._task.tell(self._share, f"{self._name}: {called} has driven {made} of {wanted}, {reached} reached")
 
 
 def _learned_or_given(task: Task, parameters: Parameters) -> list[Path]:
@@ -176,16 +186,12 @@ def _learn(task: Task, folder: Path, kind: str, course: Course, seed: int, param
     parts = {name: value for name, value in left_out.items() if name != "dagger"}
     config = replace(CloningConfig(), passes=course.passes, **parts)
     teller = _Teller(task, course.passes, folder.name)
-    done = [0.0]
-
-    def told(made: int, wanted: int, reached: int, called: str) -> None:
-        task.tell(done[0], f"{folder.name}: {called} has driven {made} of {wanted}, {reached} reached")
-
     drives = Drives(eyes=parameters.eyes, seconds=min(60.0, parameters.seconds), seed=seed, jobs=parameters.jobs)
-    gather = Aggregation(drives, course, folder, task.stopped, told)
-    judging = judge(drives, parameters.judged, task.stopped, told) if parameters.judged else None
+    gather = Aggregation(drives, course, folder, task.stopped, teller.drove)
+    judging = judge(drives, parameters.judged, task.stopped, teller.drove) if parameters.judged else None
     stages = tuple(stage.passes for stage in course.stages)
-    plan = Plan(folder, stages, {"experiment": "huber-cloning", "kind": kind}, seed, held=0.05, judgements=1)
+    source = {"experiment": "huber-cloning", "kind": kind, "eyes": parameters.eyes.kind}
+    plan = Plan(folder, stages, source, seed, held=0.05, judgements=1)
     try:
         Cloning(config, plan, gather, judge=judging, reporter=teller, stop=teller.stop).run()
     except BadInput:

@@ -43,7 +43,7 @@ def loss_history(path: Path, runs: Mapping[str, Mapping[str, np.ndarray]], held:
     axes = plain_axes(figure)
     for number, (name, columns) in enumerate(runs.items()):
         ink = _INKS[number % len(_INKS)]
-        axes.plot(columns["looks"], columns["command"], color=ink, lw=0.9, alpha=0.8, label=name)
+        axes.plot(columns["looks"], columns["command"], color=ink, lw=0.9, marker=".", ms=3, alpha=0.8, label=name)
         if name in held:
             axes.axhline(held[name], color=ink, ls="--", lw=1)
     axes.set(xlabel="looks learned from", ylabel="loss of the command", title="figure 4.16: dashed, unseen drives")
