@@ -10,7 +10,8 @@ from drives import drive
 
 from toddle.cli import main
 from toddle.outside.dataset.writer import Writer
-from toddle.outside.navigation.cloning_files import is_cloned, load_cloned
+from toddle.outside.navigation.cloning_files import load_cloned
+from toddle.outside.navigation.room_policies import is_cloned
 
 QUICK = ("--judged", "0", "--json", "--passes", "600")
 

@@ -23,9 +23,9 @@ from toddle.navigate.cloning.training import begin
 from toddle.navigate.scenarios.rooms import SCENARIOS
 from toddle.navigate.task import Outcome as End
 from toddle.outside.files import finite
-from toddle.outside.navigation.cloning_files import is_cloned
 from toddle.outside.navigation.room_eyes import EyeOptions
 from toddle.outside.navigation.room_judging import figures_of
+from toddle.outside.navigation.room_policies import is_cloned
 from toddle.outside.navigation.room_run import RoomFinish
 
 TINY = experiment.Parameters(

@@ -19,13 +19,13 @@ from toddle.navigate.cloning.policy import Cloned
 from toddle.navigate.cloning.training import begin, step
 from toddle.outside.navigation.cloning_files import (
     Saved,
-    is_cloned,
     load_cloned,
     load_run,
     save_cloned,
     save_run,
 )
 from toddle.outside.navigation.export_cloned import export_cloned
+from toddle.outside.navigation.room_policies import is_cloned
 
 Answers = Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]
 

@@ -28,10 +28,11 @@ class Export:
 def main(argv: Sequence[str]) -> int:
     """Write the file; returns the exit code."""
     asked = parse(Export, argv, prog="toddle navigate export")
-    from toddle.outside.navigation.cloning_files import is_cloned, load_cloned
+    from toddle.outside.navigation.cloning_files import load_cloned
     from toddle.outside.navigation.export_cloned import export_cloned
     from toddle.outside.navigation.export_policy import export_policy
     from toddle.outside.navigation.policy_files import load_policy
+    from toddle.outside.navigation.room_policies import is_cloned
 
     if is_cloned(asked.policy):
         export_cloned(load_cloned(asked.policy), asked.file)

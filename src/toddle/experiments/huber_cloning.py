@@ -32,11 +32,12 @@ from toddle.navigate.cloning.training import validation
 from toddle.navigate.scenarios.rooms import SCENARIOS, Scenario, Style
 from toddle.navigate.task import Outcome as End
 from toddle.outside.navigation.cloned import cloned
-from toddle.outside.navigation.cloning_files import is_cloned, load_cloned
+from toddle.outside.navigation.cloning_files import load_cloned
 from toddle.outside.navigation.physics_batch import Recipe
 from toddle.outside.navigation.room_batch import Drive, Judged, keys, run_rooms
 from toddle.outside.navigation.room_eyes import EyeOptions
 from toddle.outside.navigation.room_judging import figures_of
+from toddle.outside.navigation.room_policies import is_cloned
 from toddle.outside.navigation.room_run import RoomFinish, RoomRules
 
 KINDS: dict[str, dict[str, bool]] = {

@@ -7,7 +7,6 @@ newest whole one is taken up, so that whatever is cut off while it is written co
 from __future__ import annotations
 
 import dataclasses
-import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -72,15 +71,6 @@ def load_cloned(folder: str | os.PathLike[str]) -> Cloned:
         return Cloned(net, scale, config, dict(facts["source"]), dict(facts["figures"]))
     except _UNLIKE as fault:
         raise BadInput(f"it is not a policy of this version ({fault})", where=str(path), remedy=_AGAIN) from fault
-
-
-def is_cloned(folder: Path) -> bool:
-    """Whether the policy in a folder is one that learned by watching, or else none, or another."""
-    try:
-        record = json.loads((folder / "policy.json").read_bytes())
-        return record["format"] == f"toddle {KIND}"
-    except (OSError, LookupError, TypeError, ValueError, RecursionError):
-        return False
 
 
 @dataclass(frozen=True, eq=False)
