@@ -15,11 +15,10 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from toddle.failures import BadInput
+from toddle.outside.export_file import write_export
 from toddle.outside.export_models import model_problem
 from toddle.outside.export_rigid import rigid_problem
 from toddle.outside.export_solve import Problem, answered
-from toddle.outside.files import write_bytes
 from toddle.outside.versions import versions
 from toddle.reach.body_skill import BodySkill
 from toddle.reach.model.rigid import Rigid
@@ -38,14 +37,25 @@ def export(skill: BodySkill, path: Path) -> None:
         BadInput: the ending names no format, the folder isn't there, or the skill's model can't be exported.
         MissingExtra: ONNX isn't installed.
     """
-    written = _writer(path)
-    if not path.parent.is_dir():
-        raise BadInput("its folder isn't there", where=str(path), remedy="make it, or name another")
+
+    def onnx() -> bytes:
+        from toddle.outside.export_onnx import onnx_bytes
+
+        return _content(skill, onnx_bytes)
+
+    def jax() -> bytes:
+        from toddle.outside.export_jax import jax_bytes
+
+        return _content(skill, jax_bytes)
+
+    write_export(path, onnx, jax)
+
+
+def _content(skill: BodySkill, written: Callable[..., bytes]) -> bytes:
     problem, inputs = problem_of(skill), {"target": skill.fit.model.space}
     if skill.turned:
         inputs["quaternion"] = 4
-    answer = lambda ops, *given: answered(ops, problem, *given)  # noqa: E731
-    write_bytes(path, written(answer, inputs, about(skill)))
+    return written(lambda ops, *given: answered(ops, problem, *given), inputs, about(skill))
 
 
 def problem_of(skill: BodySkill) -> Problem:
@@ -75,18 +85,6 @@ def about(skill: BodySkill) -> dict[str, object]:
         "expected_error_m": float(np.mean(mean)),
         "expected_error_90_m": float(np.mean(most)),
     }
-
-
-def _writer(path: Path) -> Callable[..., bytes]:
-    if path.suffix == ".onnx":
-        from toddle.outside.export_onnx import onnx_bytes
-
-        return onnx_bytes
-    if path.suffix == ".jax":
-        from toddle.outside.export_jax import jax_bytes
-
-        return jax_bytes
-    raise BadInput(f"{path.suffix or 'no ending'} is no format", where=str(path), remedy="end it in .onnx or .jax")
 
 
 def _inward(limit: Float[np.ndarray, " joints"], towards: float) -> Float[np.ndarray, " joints"]:

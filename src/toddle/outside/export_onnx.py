@@ -8,14 +8,14 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from toddle.failures import MissingExtra
 from toddle.outside.export_ops import State, Tensor
 
-OPSET, _IR = 18, 9  # read by every ONNX Runtime since 1.14 (2023)
+_OPSET, _IR = 18, 9  # read by every ONNX Runtime since 1.14 (2023)
 _FLOAT, _INT64, _BOOL = 1, 7, 9  # TensorProto.DataType
 
 
@@ -217,10 +217,22 @@ def _scalar(value: Value, kind: int) -> Any:
     return _onnx().helper.make_tensor_value_info(value.name, kind, [])
 
 
+class Port(NamedTuple):
+    """An input or an output of a file.
+
+    Attributes:
+        shape: behind the batch.
+        dtype: of its numbers.
+    """
+
+    shape: tuple[int, ...]
+    dtype: str = "float32"
+
+
 def onnx_bytes(
     answer: Callable[..., dict[str, Tensor]], inputs: Mapping[str, int], about: Mapping[str, object]
 ) -> bytes:
-    """The file's content.
+    """The content of a skill's file.
 
     Args:
         answer: from operations and the inputs to the outputs by name; the last axis of each but ``joints`` has gone.
@@ -230,22 +242,46 @@ def onnx_bytes(
     Raises:
         MissingExtra: ONNX isn't installed.
     """
-    onnx, graph = _onnx(), Graph()
-    make = onnx.helper
+    graph = Graph()
     outputs = answer(graph, *(Value(graph, name) for name in inputs))
-    for name, value in outputs.items():
-        graph.scopes[-1].append(make.make_node("Identity", [value.name], [name]))
     joints = len(about["joints"])  # pyright: ignore[reportArgumentType]
-    shapes = {name: ["batch", joints] if name == "joints" else ["batch"] for name in outputs}
+    given = {name: Port((count,)) for name, count in inputs.items()}
+    found = {name: (value, Port((joints,) if name == "joints" else ())) for name, value in outputs.items()}
+    return model_bytes(graph, given, found, about)
+
+
+def model_bytes(
+    graph: Graph, inputs: Mapping[str, Port], outputs: Mapping[str, tuple[Value, Port]], about: Mapping[str, object]
+) -> bytes:
+    """A file's content.
+
+    Args:
+        graph: that leads from the inputs, by their names, to the outputs.
+        inputs: for any batch.
+        outputs: likewise.
+        about: facts, kept in the file; ``toddle`` is the version.
+
+    Raises:
+        MissingExtra: ONNX isn't installed.
+    """
+    onnx = _onnx()
+    make = onnx.helper
+    for name, (value, _) in outputs.items():
+        graph.scopes[-1].append(make.make_node("Identity", [value.name], [name]))
+
+    def told(name: str, port: Port) -> Any:
+        kind = make.np_dtype_to_tensor_dtype(np.dtype(port.dtype))
+        return make.make_tensor_value_info(name, kind, ["batch", *port.shape])
+
     model = make.make_model(
         make.make_graph(
             graph.scopes[-1],
             "toddle",
-            [make.make_tensor_value_info(name, _FLOAT, ["batch", count]) for name, count in inputs.items()],
-            [make.make_tensor_value_info(name, _FLOAT, shape) for name, shape in shapes.items()],
+            [told(name, port) for name, port in inputs.items()],
+            [told(name, port) for name, (_, port) in outputs.items()],
             list(graph.constants.values()),
         ),
-        opset_imports=[make.make_opsetid("", OPSET)],
+        opset_imports=[make.make_opsetid("", _OPSET)],
         ir_version=_IR,
         producer_name="toddle",
         producer_version=str(about["toddle"]),

@@ -18,20 +18,17 @@ import jax.numpy as jnp
 import numpy as np
 from jax import export
 
-from toddle.failures import BadInput, MissingExtra
 from toddle.navigate.cloning import commands
 from toddle.navigate.cloning.frames import NEAREST
 from toddle.navigate.cloning.light import SQUARE, LightEyes
 from toddle.navigate.cloning.policy import Cloned
 from toddle.navigate.cloning.unet import UNetEyes
 from toddle.navigate.sight import COLUMNS, PERIOD, ROWS
+from toddle.outside.export_file import write_export
 from toddle.outside.export_jax import PLATFORMS
-from toddle.outside.export_onnx import OPSET, Graph, Value
-from toddle.outside.files import write_bytes
+from toddle.outside.export_onnx import Graph, Port, Value, model_bytes
 from toddle.outside.navigation.export_policy import lstm
 from toddle.outside.versions import versions
-
-_IR = 9  # read by every ONNX Runtime since 1.14 (2023)
 
 
 def export_cloned(policy: Cloned, path: Path) -> None:
@@ -45,13 +42,7 @@ def export_cloned(policy: Cloned, path: Path) -> None:
         BadInput: the ending names no format, or the folder isn't there.
         MissingExtra: ONNX isn't installed.
     """
-    writers = {".onnx": _onnx_bytes, ".jax": _jax_bytes}
-    if path.suffix not in writers:
-        found = path.suffix or "no ending"
-        raise BadInput(f"{found} is no format", where=str(path), remedy="end it in .onnx or .jax")
-    if not path.parent.is_dir():
-        raise BadInput("its folder isn't there", where=str(path), remedy="make it, or name another")
-    write_bytes(path, writers[path.suffix](policy))
+    write_export(path, lambda: _onnx_bytes(policy), lambda: _jax_bytes(policy))
 
 
 def about(policy: Cloned) -> dict[str, Any]:
@@ -89,35 +80,16 @@ def _jax_bytes(policy: Cloned) -> bytes:
 
 def _onnx_bytes(policy: Cloned) -> bytes:
     """A graph of the standard operators."""
-    try:
-        import onnx
-    except ImportError:
-        raise MissingExtra("onnx", "export", what_for="an .onnx file") from None
-    make, graph = onnx.helper, Graph()
-    number, byte = onnx.TensorProto.FLOAT, onnx.TensorProto.UINT8
-    memory = ["batch", *policy.start().shape]
-    for name, value in _answer(policy, graph).items():
-        graph.scopes[-1].append(make.make_node("Identity", [value.name], [name]))
-    given = [
-        make.make_tensor_value_info("picture", byte, ["batch", ROWS, COLUMNS, 3]),
-        make.make_tensor_value_info("depth", number, ["batch", ROWS, COLUMNS]),
-        make.make_tensor_value_info("velocity", number, ["batch", 2]),
-        make.make_tensor_value_info("memory", number, memory),
-    ]
-    found = [
-        make.make_tensor_value_info("command", number, ["batch", 2]),
-        make.make_tensor_value_info("next_memory", number, memory),
-    ]
-    model = make.make_model(
-        make.make_graph(graph.scopes[-1], "toddle", given, found, list(graph.constants.values())),
-        opset_imports=[make.make_opsetid("", OPSET)],
-        ir_version=_IR,
-        producer_name="toddle",
-        producer_version=versions()["toddle"],
-    )
-    make.set_model_props(model, {key: json.dumps(value) for key, value in about(policy).items()})
-    onnx.checker.check_model(model)
-    return model.SerializeToString()
+    graph, memory = Graph(), Port(policy.start().shape)
+    ports = {"command": Port((2,)), "next_memory": memory}
+    given = {
+        "picture": Port((ROWS, COLUMNS, 3), "uint8"),
+        "depth": Port((ROWS, COLUMNS)),
+        "velocity": Port((2,)),
+        "memory": memory,
+    }
+    found = {name: (value, ports[name]) for name, value in _answer(policy, graph).items()}
+    return model_bytes(graph, given, found, about(policy))
 
 
 def _answer(policy: Cloned, graph: Graph) -> dict[str, Value]:

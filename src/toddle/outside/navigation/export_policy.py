@@ -19,17 +19,14 @@ import jax.numpy as jnp
 import numpy as np
 from jax import export
 
-from toddle.failures import BadInput, MissingExtra
 from toddle.navigate.policy import Policy
 from toddle.navigate.ppo.network import Layers
 from toddle.navigate.task import Continuous
+from toddle.outside.export_file import write_export
 from toddle.outside.export_jax import PLATFORMS
-from toddle.outside.export_onnx import OPSET, Graph, Value
-from toddle.outside.files import write_bytes
+from toddle.outside.export_onnx import Graph, Port, Value, model_bytes
 from toddle.outside.navigation.policy_files import actions_facts
 from toddle.outside.versions import versions
-
-_IR = 9  # read by every ONNX Runtime since 1.14 (2023)
 
 
 def export_policy(policy: Policy, path: Path) -> None:
@@ -43,13 +40,7 @@ def export_policy(policy: Policy, path: Path) -> None:
         BadInput: the ending names no format, or the folder isn't there.
         MissingExtra: ONNX isn't installed.
     """
-    writers = {".onnx": _onnx_bytes, ".jax": _jax_bytes}
-    if path.suffix not in writers:
-        found = path.suffix or "no ending"
-        raise BadInput(f"{found} is no format", where=str(path), remedy="end it in .onnx or .jax")
-    if not path.parent.is_dir():
-        raise BadInput("its folder isn't there", where=str(path), remedy="make it, or name another")
-    write_bytes(path, writers[path.suffix](policy))
+    write_export(path, lambda: _onnx_bytes(policy), lambda: _jax_bytes(policy))
 
 
 def about(policy: Policy) -> dict[str, Any]:
@@ -90,31 +81,13 @@ def _jax_bytes(policy: Policy) -> bytes:
 
 def _onnx_bytes(policy: Policy) -> bytes:
     """A graph of the standard operators."""
-    try:
-        import onnx
-    except ImportError:
-        raise MissingExtra("onnx", "export", what_for="an .onnx file") from None
-    make, units, graph = onnx.helper, policy.config.memory, Graph()
-    outputs = _answer(policy, graph)
-    for name, value in outputs.items():
-        graph.scopes[-1].append(make.make_node("Identity", [value.name], [name]))
-    number, whole = onnx.TensorProto.FLOAT, onnx.TensorProto.INT32
-    given = [make.make_tensor_value_info("observation", number, ["batch", policy.observations])]
-    size = [policy.actions.size] if isinstance(policy.actions, Continuous) else []
-    found = [make.make_tensor_value_info("action", number if size else whole, ["batch", *size])]
-    if units:
-        given.append(make.make_tensor_value_info("memory", number, ["batch", 2, units]))
-        found.append(make.make_tensor_value_info("next_memory", number, ["batch", 2, units]))
-    model = make.make_model(
-        make.make_graph(graph.scopes[-1], "toddle", given, found, list(graph.constants.values())),
-        opset_imports=[make.make_opsetid("", OPSET)],
-        ir_version=_IR,
-        producer_name="toddle",
-        producer_version=versions()["toddle"],
-    )
-    make.set_model_props(model, {key: json.dumps(value) for key, value in about(policy).items()})
-    onnx.checker.check_model(model)
-    return model.SerializeToString()
+    units, graph = policy.config.memory, Graph()
+    outputs, memory = _answer(policy, graph), Port((2, units))
+    action = Port((policy.actions.size,)) if isinstance(policy.actions, Continuous) else Port((), "int32")
+    ports = {"action": action, "next_memory": memory}
+    given = {"observation": Port((policy.observations,))} | ({"memory": memory} if units else {})
+    found = {name: (value, ports[name]) for name, value in outputs.items()}
+    return model_bytes(graph, given, found, about(policy))
 
 
 def _answer(policy: Policy, graph: Graph) -> dict[str, Value]:
