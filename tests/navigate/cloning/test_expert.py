@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -22,9 +23,11 @@ HALF_VIEW = math.radians(34.0)
 Rows = list[tuple[float, float, float]]
 
 
-def _situation(t: float, place: tuple[float, float, float], rows: Rows, shown: list[int]) -> Situation:
+def _situation(
+    t: float, place: tuple[float, float, float], rows: Rows, shown: list[int], felt: Velocity = STILL
+) -> Situation:
     showing = Showing(np.array(place), np.array(rows, float), np.array(shown), HALL)
-    return Situation(t, showing.place, (0.0, 0.0), STILL, showing=showing)
+    return Situation(t, showing.place, (0.0, 0.0), felt, showing=showing)
 
 
 def _shown(place: tuple[float, float, float], rows: Rows) -> list[int]:
@@ -39,11 +42,11 @@ def _drive(
 ) -> tuple[list[tuple[float, float, float]], list[Velocity]]:
     """A point that does at once what the expert asks for."""
     driver, (x, y) = expert or Expert(), (0.0, 0.0)
-    memory, places, asked = driver.start(), [], []
+    memory, places, asked, velocity = driver.start(), [], [], STILL
     for look in range(round(seconds / PERIOD)):
         t, place = look * PERIOD, (x, y, yaw)
         now = rows(t)
-        velocity, memory = driver.decide(memory, _situation(t, place, now, _shown(place, now)))
+        velocity, memory = driver.decide(memory, _situation(t, place, now, _shown(place, now), velocity))
         places.append(place)
         asked.append(velocity)
         x += PERIOD * velocity.vx * math.cos(yaw)
@@ -88,6 +91,16 @@ def test_it_goes_around_what_stands_in_the_way(aside: float) -> None:
     places, asked = _drive(lambda t: [(3.0, 0.0, 0.1), thing], 50.0)
     assert asked[-1] == STILL
     assert min(math.dist(place[:2], thing[:2]) for place in places) - thing[2] > 0.28
+
+
+@pytest.mark.parametrize("radius", [0.12, 0.2, 0.3, 0.45])
+@given(st.floats(-0.3, 0.3))
+@settings(deadline=None, max_examples=15)
+def test_it_does_not_dither_before_what_stands_in_the_way(radius: float, aside: float) -> None:
+    _, asked = _drive(lambda t: [(3.0, 0.0, 0.1), (1.4, aside, radius)], 35.0)
+    turning = [velocity.omega for velocity in asked if abs(velocity.omega) > 0.2]
+    assert sum(one * other < 0 for one, other in pairwise(turning)) <= 4
+    assert asked[-1] == STILL
 
 
 def test_left_of_what_is_right_ahead() -> None:

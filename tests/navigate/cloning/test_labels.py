@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from drives import drive
 
+from toddle.navigate.cloning.expert import Expert
 from toddle.navigate.cloning.labels import COS, DISTANCE, FIRST_SECTOR, REACH, SEEN, SIN, VISIBLE, labels_of
 from toddle.navigate.cloning.recording import Recording
 
@@ -30,10 +31,11 @@ def test_the_target_is_told_in_the_robots_frame() -> None:
     assert found[DISTANCE] == pytest.approx(math.sqrt(2) / REACH)
 
 
-def test_what_was_seen_is_known_for_twelve_seconds() -> None:
-    found = labels_of(_looks([0.0, 0.0, 0.0], [[2.0, 0.0, 0.1]], [[0], [6], *([[5]] * 14)]))
-    assert found[:, VISIBLE].tolist() == [0, 1] + [0] * 14
-    assert found[:, SEEN].tolist() == [0] + [1] * 13 + [0, 0]
+def test_what_was_seen_is_known_for_as_long_as_the_expert_remembers_it() -> None:
+    known = round(Expert().memory)
+    found = labels_of(_looks([0.0, 0.0, 0.0], [[2.0, 0.0, 0.1]], [[0], [6], *([[5]] * (known + 2))]))
+    assert found[:, VISIBLE].tolist() == [0, 1] + [0] * (known + 2)
+    assert found[:, SEEN].tolist() == [0] + [1] * (known + 1) + [0, 0]
 
 
 def test_nearness_lies_in_the_things_sectors() -> None:

@@ -14,12 +14,12 @@ from jaxtyping import Bool, Float
 
 from toddle.navigate.scenarios.rooms import Hall
 
-_RING = np.arange(10) * math.pi / 5  # where nodes stand around a circle [rad]
-_CHORD = 1.0 / math.cos(math.pi / 10)  # so that the way between two neighbours stays clear of it
+_RING = np.arange(14) * math.pi / 7  # where nodes stand around a circle [rad]
+_CHORD = 1.0 / math.cos(math.pi / 14)  # so that the way between two neighbours stays clear of it
 _SPARE = 0.03  # beyond the disc [m]
 _SLACK = 0.06  # of a disc that stands at a circle, or it would see no way along it [m]
 _TOUCH = 0.001  # between a disc and what it overlapped [m]
-_PASSED = 0.2  # a corner so near is not gone to [m]
+_PASSED = 0.15  # a corner so near is not gone to: the one after it must show then [m]
 _HOPS = 8  # corners of a way, at most
 _STEP = 0.1  # between places along a heading that are compared with walls [m]
 

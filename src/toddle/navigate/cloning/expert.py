@@ -1,9 +1,10 @@
 """The expert that networks learn from: it steers by the truth, but uses of it only what shows, or has shown lately.
 
 It walks along the cheapest of 65 headings: towards the target or the first corner on the way to it (`detour`), clear of
-what stands around, rather left of things than right of them, so that alike situations are answered alike, and rather on
-as before. It waits for who steps in the way, backs off from what is too near, turns around once to search, then moves
-on to where there is room. It stands still within the target's radius. Walls always show: they are known.
+what stands around, rather left of things than right of them, so that alike situations are answered alike, and rather
+where the robot turns to already: whoever watches knows that too, and not what an expert meant to do. It waits for who
+steps in the way, backs off from what is too near, turns around once to search, then moves on to where there is room. It
+stands still within the target's radius. Walls always show: they are known.
 """
 
 from __future__ import annotations
@@ -17,15 +18,19 @@ from jaxtyping import Bool, Float
 
 from toddle.failures import BadInput
 from toddle.navigate.cloning.detour import first_corner, free_lengths, gaps
+from toddle.navigate.cloning.labels import FEWEST, MEMORY
 from toddle.navigate.driver import Situation
 from toddle.navigate.sight import PERIOD, Showing
 from toddle.signals import STILL, Velocity
 
-_FEWEST = 6, 12  # pixels that show the target, and anything else
 _HEADINGS = np.linspace(-2.1, 2.1, 65)  # relative to where it wants to go [rad]
 _RIGHT = 2.5  # to the right is so much dearer
 _BLOCKED = 20.0  # cost of a heading that touches something [rad]
 _AHEAD = 1.0  # headings are compared so far [m]
+_LEAD = 1.0  # where the robot turns to: it looks there after so long [s]
+_TURN_BACK = 0.3  # what a radian aside costs where to go on with the search is chosen [m]
+_ELSEWHERE = 0.6  # what a radian away from there costs [rad]
+_CORNER_RIGHT, _CORNER_ELSEWHERE = 0.25, 0.3  # what a radian to the right, and one away from there, cost [m]
 _WALKS = 0.1  # who is seen to be faster is somebody [m/s]
 _NOWHERE = (math.nan, math.nan)
 
@@ -38,10 +43,10 @@ class Known(NamedTuple):
         circles: x, y, radius of each as it then was [m].
         speed: of each, x, y, as it then was [m/s].
         walks: who was ever seen to walk.
-        heading: the last one, in the room [rad]; NaN: none.
         side: 1: search to the left, -1: to the right.
         turned: how far the search has turned [rad].
         yaw: at the last look [rad].
+        towards: where the robot turns to [rad].
         refuge: where to go on with the search; NaN: nowhere.
         until: the walk there ends [s].
         waited: for people in the way, without going on in between [s].
@@ -52,10 +57,10 @@ class Known(NamedTuple):
     circles: Float[np.ndarray, "things 3"]
     speed: Float[np.ndarray, "things 2"]
     walks: Bool[np.ndarray, " things"]
-    heading: float = math.nan
     side: float = 1.0
     turned: float = 0.0
     yaw: float = math.nan
+    towards: float = 0.0
     refuge: tuple[float, float] = _NOWHERE
     until: float = 0.0
     waited: float = 0.0
@@ -73,6 +78,7 @@ class Expert:
         body: never less than this [m].
         stop: stands still so near to the target's middle [m].
         memory: things are remembered so long [s].
+        people: whoever walks is remembered so long [s].
         patience: waits so long for somebody in the way, then goes around [s].
         period: between two decisions [s].
     """
@@ -82,7 +88,8 @@ class Expert:
     berth: float = 0.42
     body: float = 0.31
     stop: float = 0.5
-    memory: float = 25.0
+    memory: float = MEMORY
+    people: float = 6.0
     patience: float = 15.0
     period: float = PERIOD
 
@@ -100,6 +107,7 @@ class Expert:
         if showing is None:
             raise BadInput("nobody tells the expert what shows", where="expert", remedy="let it drive through rooms")
         known = _looked(memory, showing, t)
+        known = known._replace(towards=known.yaw + _LEAD * situation.velocity.omega)
         if t - known.seen[0] <= self.memory:
             bearing = _bearing(showing, known.circles[0])
             return self._approach(
@@ -123,13 +131,14 @@ class Expert:
             known = known._replace(refuge=_NOWHERE, turned=0.0)
         if known.turned < 2 * math.pi:
             back = self._back(self._around(known, t), showing)
-            return Velocity(back, 0.0, known.side * self.turning), known._replace(heading=math.nan)
-        headings = showing.place[2] + np.linspace(-math.pi, math.pi, 65)[1:]
+            return Velocity(back, 0.0, known.side * self.turning), known
+        aside = np.linspace(-math.pi, math.pi, 65)
+        headings = showing.place[2] + aside
         free = free_lengths(showing.place[:2], headings, self._around(known, t), showing.hall, self.body, 2.0)
-        best = int(np.argmax(free))
+        best = int(np.argmax(free - _TURN_BACK * np.abs(aside)))
         far = max(float(free[best]) - 0.2, 0.3)
         refuge = showing.place[0] + far * math.cos(headings[best]), showing.place[1] + far * math.sin(headings[best])
-        known = known._replace(refuge=refuge, until=t + 15.0, heading=math.nan)
+        known = known._replace(refuge=refuge, until=t + 15.0)
         return self._walk(known, showing, refuge, t, 1.0)
 
     def _walk(
@@ -144,20 +153,21 @@ class Expert:
             towards = _bearing(showing, somebody)
             omega = 0.0 if abs(towards) < 0.35 else math.copysign(self.turning, towards)
             return Velocity(back, 0.0, omega), known._replace(waited=known.waited + self.period)
-        corner = first_corner(place, end, around, showing.hall, self.body + 0.03, known.heading, 0.25, 0.15)
+        corner = first_corner(
+            place, end, around, showing.hall, self.body + 0.03, known.towards, _CORNER_RIGHT, _CORNER_ELSEWHERE
+        )
         wanted = math.atan2(corner[1] - place[1], corner[0] - place[0])
         far = min(max(math.dist(corner, place), 0.2), _AHEAD)
         headings = wanted + _HEADINGS
         cost = np.abs(_HEADINGS) * np.where(_HEADINGS < 0, _RIGHT, 1.0)
+        cost += _ELSEWHERE * np.abs(_wrapped(headings - known.towards))
         cost += self._danger(around, showing, headings, far)
-        if math.isfinite(known.heading):
-            cost += 0.4 * np.abs(_wrapped(headings - known.heading))
         best = float(headings[int(np.argmin(cost))])
         off = math.remainder(best - yaw, 2 * math.pi)
         omega = min(max(1.2 * off, -self.turning), self.turning)
         free = float(free_lengths(place, np.array([yaw]), around, showing.hall, self.body - 0.02, 1.0)[0])
         ahead = self.fastest * min(share * max(1.0 - abs(off) / 0.7, 0.0), free / 0.5)
-        known = known._replace(heading=best, waited=0.0 if somebody is None else known.waited)
+        known = known._replace(waited=0.0 if somebody is None else known.waited)
         return Velocity(back if back < 0 else ahead, 0.0, omega), known
 
     def _danger(
@@ -175,7 +185,7 @@ class Expert:
     ) -> Float[np.ndarray, "3"] | None:
         """Where somebody is who stands, or will come, between here and the goal; None: nobody is."""
         place = showing.place[:2]
-        fresh = known.walks & (t - known.seen <= self.memory / 5)
+        fresh = known.walks & (t - known.seen <= self.people)
         fresh[0] = False
         way = math.atan2(goal[1] - place[1], goal[0] - place[0])
         far = min(float(np.hypot(*(goal - place))), 1.5)
@@ -196,7 +206,7 @@ class Expert:
 
     def _around(self, known: Known, t: float) -> Float[np.ndarray, "known 3"]:
         """What is remembered, the target left out; of who walks also where that will be in a second."""
-        fresh = t - known.seen <= np.where(known.walks, self.memory / 5, self.memory)
+        fresh = t - known.seen <= np.where(known.walks, self.people, self.memory)
         fresh[0] = False
         soon = known.circles[fresh & known.walks].copy()
         soon[:, :2] += known.speed[fresh & known.walks]
@@ -209,7 +219,7 @@ def _looked(known: Known, showing: Showing, t: float) -> Known:
     if len(known.seen) != things:
         nothing, still = np.full(things, -np.inf), np.zeros((things, 2))
         known = known._replace(seen=nothing, circles=showing.circles.copy(), speed=still, walks=np.zeros(things, bool))
-    shows = showing.pixels >= np.where(np.arange(things) == 0, *_FEWEST)
+    shows = showing.pixels >= np.where(np.arange(things) == 0, *FEWEST)
     since = t - known.seen
     moved = np.where((shows & (since < 0.5))[:, None], showing.circles[:, :2] - known.circles[:, :2], 0.0)
     speed = moved / np.where(np.isfinite(since) & (since > 0), since, 1.0)[:, None]

@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Float32
 
 from toddle.navigate.cloning.recording import Recording
 
-MEMORY = 12.0
+MEMORY = 20.0
 """Things that were seen are known so long [s]."""
 
 FEWEST = 6, 12
