@@ -24,7 +24,8 @@ help: ## show this list
 demo: .venv/.ready-to-run ## watch a humanoid's arm learn to reach
 	$(BIN)/toddle reach nicu
 
-test: lint types tests docs ## everything that must hold: format, lint, types, tests, examples, docs
+test: lint ## everything that must hold: format, lint, types, tests, examples, docs
+	@$(MAKE) --no-print-directory -j2 tests types docs
 
 lint: .venv/.ready-to-develop ## check the format and the rules
 	$(call stage,format,$(BIN)/ruff format --check --quiet .)
@@ -34,7 +35,7 @@ types: .venv/.ready-to-develop ## check the types
 	$(call stage,types,$(BIN)/pyright)
 
 tests: .venv/.ready-to-develop ## run the tests and the examples
-	$(call stage,tests,$(BIN)/pytest -n $(WORKERS) --dist loadfile --durations=10)
+	$(call stage,tests,$(BIN)/pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --durations=10)
 
 docs: .venv/.ready-to-develop ## build the documentation into site/
 	$(call stage,docs,$(BIN)/mkdocs build --strict --quiet)

@@ -16,6 +16,15 @@ from toddle.outside.compile_cache import kernel_files, kernels_hash
 SOURCE = Path(__file__).parents[1] / "src" / "toddle"
 KERNELS = kernel_files(SOURCE)
 
+# They take longest, so they go first: no worker is left with one of them in the end.
+LONGEST = (
+    "cli/test_navigate.py", "walk/pattern/test_batch.py", "test_examples.py", "test_cloning_training.py",
+    "walk/test_batch_native.py", "test_walker_task.py", "test_cloning_files.py", "test_huber_ppo_walker.py",
+    "cli/test_walk.py", "test_nmpc_walks.py", "test_navigate_record.py", "test_cloning_network.py",
+    "test_huber_cloning.py", "test_probes.py", "test_navigate_clone.py", "test_huber_ppo_toy.py",
+    "test_walk_hostile.py",
+)  # fmt: skip
+
 # All of this stands before anything imports jax, matplotlib or toddle.
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(Path(__file__).parents[1] / ".cache" / "jax"))
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
@@ -41,6 +50,13 @@ install_import_hook(checked(), "beartype.beartype")
 
 settings.register_profile("toddle", derandomize=True, deadline=None, max_examples=25, print_blob=True)
 settings.load_profile("toddle")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The longest files first."""
+    items.sort(
+        key=lambda item: next((at for at, name in enumerate(LONGEST) if str(item.path).endswith(name)), len(LONGEST))
+    )
 
 
 @pytest.fixture

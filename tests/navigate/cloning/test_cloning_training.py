@@ -44,7 +44,7 @@ def test_it_learns_what_it_is_shown(config: CloningConfig) -> None:
         given.append(one._replace(picture=one.picture // 4 + np.uint8(180 * bright), taught=taught.copy()))
     training = begin(config, given[:6], 0)
     untrained = training.learner.network
-    for _ in range(200):
+    for _ in range(120):
         training, _ = step(training, config, given[:6], 3e-3)
     before, after = (
         validation(net, training.scale, config, given[6:]) for net in (untrained, training.learner.network)

@@ -29,8 +29,7 @@ _BLOCKED = 20.0  # cost of a heading that touches something [rad]
 _AHEAD = 1.0  # headings are compared so far [m]
 _LEAD = 1.0  # where the robot turns to: it looks there after so long [s]
 _TURN_BACK = 0.3  # what a radian aside costs where to go on with the search is chosen [m]
-_ELSEWHERE = 0.6  # what a radian away from there costs [rad]
-_CORNER_RIGHT, _CORNER_ELSEWHERE = 0.25, 0.3  # what a radian to the right, and one away from there, cost [m]
+_RIGHT_FIRST, _ELSEWHERE = 0.25, 0.3  # what a radian to the right, and one away from there, cost [m]
 _WALKS = 0.1  # who is seen to be faster is somebody [m/s]
 _NOWHERE = (math.nan, math.nan)
 
@@ -154,13 +153,12 @@ class Expert:
             omega = 0.0 if abs(towards) < 0.35 else math.copysign(self.turning, towards)
             return Velocity(back, 0.0, omega), known._replace(waited=known.waited + self.period)
         corner = first_corner(
-            place, end, around, showing.hall, self.body + 0.03, known.towards, _CORNER_RIGHT, _CORNER_ELSEWHERE
+            place, end, around, showing.hall, self.body + 0.03, known.towards, _RIGHT_FIRST, _ELSEWHERE
         )
         wanted = math.atan2(corner[1] - place[1], corner[0] - place[0])
         far = min(max(math.dist(corner, place), 0.2), _AHEAD)
         headings = wanted + _HEADINGS
         cost = np.abs(_HEADINGS) * np.where(_HEADINGS < 0, _RIGHT, 1.0)
-        cost += _ELSEWHERE * np.abs(_wrapped(headings - known.towards))
         cost += self._danger(around, showing, headings, far)
         best = float(headings[int(np.argmin(cost))])
         off = math.remainder(best - yaw, 2 * math.pi)
@@ -239,7 +237,3 @@ def _bearing(showing: Showing, circle: Float[np.ndarray, "3"]) -> float:
     """Of a circle's middle, from where the robot looks [rad]."""
     x, y, yaw = showing.place.tolist()
     return math.remainder(math.atan2(circle[1] - y, circle[0] - x) - yaw, 2 * math.pi)
-
-
-def _wrapped(angles: Float[np.ndarray, " ways"]) -> Float[np.ndarray, " ways"]:
-    return np.remainder(angles + math.pi, 2 * math.pi) - math.pi
